@@ -66,6 +66,8 @@ grade=0
 rosrun "${PACKAGE}" diagnose_record run.bag --rig "${rig}" --method lost_motion --json report.json >diagnosis.txt || grade=$?
 ((grade <= 2)) || fail "diagnose_record"
 grep -q '"status": *"ok"' report.json || fail "diagnose_record does not find the backlash"
+# What knows arms is loaded from beside the other libraries.
+quietly arm rosrun "${PACKAGE}" simulate "${share}/config/two_link_arm/two_link_arm.yaml" --duration 0.2 --out arm.csv || fail "simulate of an arm"
 quietly convert rosrun "${PACKAGE}" convert_record run.bag run.csv || fail "convert_record"
 quietly plot rosrun "${PACKAGE}" plot_record.py run.csv --out run.png || fail "plot_record.py"
 [[ -s run.png ]] || fail "plot_record.py drew nothing"

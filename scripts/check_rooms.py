@@ -15,7 +15,7 @@ INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 NAMESPACE = re.compile(r"^namespace backlash(\S*) \{", re.MULTILINE)
 SHARED = ("base", "nodes")  # in the outer namespace: the words of all rooms, and mains
-OTHER_NAMES = {"ros": "ros_bridge"}  # backlash::ros would hide ::ros
+OTHER_NAMES = {"ros": "ros_bridge", "ros_arm": "ros_bridge"}  # backlash::ros would hide ::ros
 PROGRAMS = ("nodes", "tools")  # read private headers of all: nobody links them
 
 

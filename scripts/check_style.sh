@@ -71,7 +71,7 @@ headers() {
     names=$(git diff --name-only --diff-filter=d "$(changed_since)" -- include; git ls-files -o --exclude-standard include)
   fi
   local name failed=0
-  for name in $(grep -v '/ros/' <<<"${names}"); do
+  for name in $(grep -vE '/ros(_arm)?/' <<<"${names}"); do
     g++ -std=c++17 -fsyntax-only -Wall -Wextra -Iinclude -isystem /usr/include/eigen3 -x c++ - <<<"#include \"${name#include/}\"" ||
       failed=1
   done

@@ -12,7 +12,7 @@ if (($# > 0)); then
 fi
 
 echo "Building in ${WS} (minutes the first time, seconds later)"
-build "${PACKAGE}_simulate" "${PACKAGE}_diagnose_record" || exit 1
+build "${PACKAGE}_arm_tools" "${PACKAGE}_simulate" "${PACKAGE}_diagnose_record" || exit 1
 use_workspace
 out=${WS}/demo_arm
 mkdir -p "${out}"

@@ -179,12 +179,6 @@ std::vector<std::string> ArmRig::joint_names() const {
   return names;
 }
 
-bool is_urdf(const std::string& path) {
-  const std::string start = read_start(path, 4096);
-  const std::size_t first = start.find_first_not_of(" \t\r\n\xef\xbb\xbf");
-  return first != std::string::npos && start[first] == '<';
-}
-
 ArmRig arm_rig_of_urdf(const std::string& path, const HeldJoints& held) {
   ArmRig rig;
   rig.source = rig.urdf = path;
@@ -204,14 +198,6 @@ ArmRig arm_rig_of_urdf(const std::string& path, const HeldJoints& held) {
        "For plan_motion a joint may have motion_limits: {lower, upper, speed, acceleration, start} [rad, s].",
        "identification: cutoffs that records of many arms bear [choice]; look at yours."});
   return rig;
-}
-
-bool is_arm_rig(const std::string& path) {
-  if (is_urdf(path))
-    throw BadData(path,
-                  "is a URDF: what is needed is a rig file, which names it and tells the drives; "
-                  "plan_motion writes one (--write-rig) to begin with");
-  return YamlReader::from_file(path).has("urdf");
 }
 
 ArmRig load_arm_rig(const std::string& path) {

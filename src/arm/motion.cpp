@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/resampling.h"
+#include "backlash_diagnosis/record/sample_joiner.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
@@ -175,8 +176,6 @@ ArmRecord arm_record(const std::vector<record::JointRecord>& joints, const ArmRi
                      const std::string& name) {
   ArmRecord out;
   out.name = name;
-  for (const record::JointRecord& joint : joints)
-    for (const std::string& warning : joint.record.warnings) out.warnings.push_back(warning);
   for (const JointDrive& drive : rig.joints) {
     const auto known = std::find_if(joints.begin(), joints.end(),
                                     [&](const record::JointRecord& j) { return j.joint == drive.name; });
@@ -191,6 +190,11 @@ ArmRecord arm_record(const std::vector<record::JointRecord>& joints, const ArmRi
         throw BadData(name, "no column " + drive.name + "/" + record::channel_name(channel));
     out.joints.push_back(known->record);
   }
+  record::share_time_base(out.joints);
+  for (const record::Record& joint : out.joints)
+    for (const std::string& warning : joint.warnings)
+      if (std::find(out.warnings.begin(), out.warnings.end(), warning) == out.warnings.end())
+        out.warnings.push_back(warning);
   return out;
 }
 

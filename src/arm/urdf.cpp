@@ -205,7 +205,25 @@ class Reader {
   HeldJoints held_;
 };
 
+/// What xacro has to do first; without it macros would be left out and nobody would know.
+void refuse_xacro(const std::string& text, const std::string& name) {
+  std::size_t at = text.find("<xacro:");
+  for (std::size_t comment = 0; at != std::string::npos; at = text.find("<xacro:", comment)) {
+    comment = text.find("<!--", comment);
+    if (comment > at) break;
+    comment = text.find("-->", comment);
+    if (comment == std::string::npos) return;
+  }
+  if (at == std::string::npos) return;
+  const std::size_t end = text.find_first_of(" \t\r\n/>", at);
+  throw BadData(name, "is a xacro file (element " + printable(text.substr(at + 1, end - at - 1)) +
+                          "), no URDF: what its macros make would be left out. Make the URDF first: rosrun "
+                          "xacro xacro " +
+                          printable(name) + " > robot.urdf");
+}
+
 urdf::ModelInterfaceSharedPtr model_of(const std::string& text, const std::string& name) {
+  refuse_xacro(text, name);
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text);
   if (!model) throw BadData(name, "cannot be read as a URDF");
   return model;

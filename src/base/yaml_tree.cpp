@@ -59,13 +59,13 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
   void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
-                       YAML::EmitterStyle::value) override {
-    open(Kind::list, mark, tag, anchor);
+                       YAML::EmitterStyle::value style) override {
+    open(Kind::list, mark, tag, anchor, style);
   }
 
   void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
-                  YAML::EmitterStyle::value) override {
-    open(Kind::map, mark, tag, anchor);
+                  YAML::EmitterStyle::value style) override {
+    open(Kind::map, mark, tag, anchor, style);
   }
 
   void OnSequenceEnd() override { open_.pop_back(); }
@@ -101,13 +101,15 @@ class TreeBuilder : public YAML::EventHandler {
     open_.back().entry = &place->second;
   }
 
-  void open(Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) {
+  void open(Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+            YAML::EmitterStyle::value style) {
     refuse_tag(mark, tag);
     if (expects_key()) fail_at(mark, "a list or map as key");
     if (open_.size() == kDeepestYaml) {
       fail_at(mark, "nested deeper than " + std::to_string(kDeepestYaml) + " levels");
     }
     YamlNode* const node = create(kind, mark, anchor);
+    node->flow = style == YAML::EmitterStyle::Flow;
     attach(node);
     open_.push_back({node, nullptr});
   }
@@ -116,6 +118,7 @@ class TreeBuilder : public YAML::EventHandler {
     YamlNode& node = tree_.nodes.emplace_back();
     node.kind = kind;
     node.line = mark.line + 1;
+    node.column = mark.column;
     if (anchor != 0) anchors_[anchor] = &node;
     return &node;
   }

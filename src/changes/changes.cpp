@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "channel_changes.h"
+#include "different_values.h"
 
 namespace backlash::changes {
 namespace {
@@ -58,6 +59,12 @@ ChannelChanges changes_in(const HealthyModel& model, const record::Record& recor
   for (const std::string& name : search.different())
     out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
                            ": that is no change within it");
+  for (const DifferentValue& value : different_values(model, search.background(found), linear)) {
+    if (std::find(out.different.begin(), out.different.end(), value.name) != out.different.end()) continue;
+    out.different.push_back(value.name);
+    out.cannot_tell += (out.cannot_tell.empty() ? "" : "; ") +
+                       ("from its beginning the record differs from the healthy ones: " + value.text);
+  }
   return result;
 }
 
@@ -109,7 +116,8 @@ void add_deflection(const Changes& more, Changes& all) {
   all.different.insert(all.different.end(), more.different.begin(), more.different.end());
   all.warnings.insert(all.warnings.end(), more.warnings.begin(), more.warnings.end());
   all.deflection_noise = more.noise;
-  if (all.cannot_tell.empty()) all.cannot_tell = more.cannot_tell;
+  if (!all.cannot_tell.empty() && !more.cannot_tell.empty()) all.cannot_tell += "; ";
+  all.cannot_tell += more.cannot_tell;
 }
 
 /// What one channel cannot name while the other names it, or cannot either, is told once.

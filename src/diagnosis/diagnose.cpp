@@ -122,24 +122,72 @@ DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml) {
 }
 
 const std::vector<DiagnosisMethod>& diagnosis_method_table() {
+  using record::Channel;
   static const std::vector<DiagnosisMethod> methods = {
-      {"apd_skewness", "the signal of diagnosis.apd and a monitoring curve", true,
-       by_apd<estimate_apd_skewness>},
-      {"apd_shape", "the signal of diagnosis.apd and a monitoring curve", true, by_apd<estimate_apd_shape>},
-      {"lost_motion", "motor_position, and motor_torque or sensor_torque; output locked", false,
+      {"apd_skewness", {}, "a monitoring curve", true, by_apd<estimate_apd_skewness>},
+      {"apd_shape", {}, "a monitoring curve", true, by_apd<estimate_apd_shape>},
+      {"lost_motion",
+       {{Channel::motor_position}, {Channel::motor_torque, Channel::sensor_torque}},
+       "output locked",
+       false,
        by_lost_motion},
       {"position_difference",
-       "motor_position, load_position, and motor_torque, sensor_torque or output_torque", false,
+       {{Channel::motor_position},
+        {Channel::load_position},
+        {Channel::motor_torque, Channel::sensor_torque, Channel::output_torque}},
+       "",
+       false,
        by_position_difference},
-      {"momentum_transfer", "motor_velocity or motor_position; motor_torque, unless that is a square wave",
-       false, by_momentum_transfer},
+      {"momentum_transfer",
+       {{Channel::motor_velocity, Channel::motor_position}},
+       "motor_torque, unless that is a square wave",
+       false,
+       by_momentum_transfer},
       {"gap_traverse",
-       "motor_position, and load_position or motor_torque; load free, moves that reverse under load", false,
+       {{Channel::motor_torque}, {Channel::motor_position}},
+       "load free, moves that reverse under load",
+       false,
        by_gap_traverse},
-      {"waveform", "motor_torque that reverses and sensor_torque; motor_position sharpens it", false,
+      {"waveform",
+       {{Channel::motor_torque}, {Channel::sensor_torque}},
+       "torque that reverses; motor_position sharpens it",
+       false,
        by_waveform},
   };
   return methods;
+}
+
+namespace {
+
+/// "a, b or c"
+std::string any_of(const std::vector<record::Channel>& group) {
+  std::string text;
+  for (std::size_t i = 0; i < group.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == group.size() ? " or " : ", ") + record::channel_name(group[i]);
+  return text;
+}
+
+}  // namespace
+
+std::string needs_of(const DiagnosisMethod& method) {
+  std::string text = method.channels.empty() ? "the signal of diagnosis.apd" : "";
+  for (const std::vector<record::Channel>& group : method.channels)
+    text += (text.empty() ? "" : group.size() > 1 ? ", and " : ", ") + any_of(group);
+  return method.more.empty() ? text : text + "; " + method.more;
+}
+
+std::string lacking_channel(const DiagnosisMethod& method, const record::Record& record,
+                            const std::optional<ApdSettings>& apd) {
+  std::vector<std::vector<record::Channel>> groups = method.channels;
+  if (groups.empty()) {
+    if (!apd) return "a signal that diagnosis.apd of a rig file names";
+    groups = {{apd->signal}};
+  }
+  for (const std::vector<record::Channel>& group : groups)
+    if (std::none_of(group.begin(), group.end(),
+                     [&](record::Channel channel) { return record.has(channel); }))
+      return any_of(group);
+  return "";
 }
 
 const std::vector<std::string>& diagnosis_methods() {

@@ -222,14 +222,15 @@ void print_summary(const identification::Identification& found, std::ostream& ou
   for (const identification::ProcedureReport& p : found.procedures)
     out << fmt::format("  {:<20}{}{}\n", p.name, p.records.empty() ? "not used: " : "", p.message);
   out << "\nparameters (load side of the reduction)\n";
-  for (const auto& [name, m] : found.parameters) {
-    out << fmt::format("  {:<26} {:12.6g}  +- {:<9.2g} {}\n", name, m.value, m.standard_error,
-                       found.units.at(name));
-  }
+  for (const auto& [name, m] : found.parameters)
+    out << (std::isinf(m.standard_error) ? fmt::format("  {:<26} not determined by these records\n", name)
+                                         : fmt::format("  {:<26} {:12.6g}  +- {:<9.2g} {}\n", name, m.value,
+                                                       m.standard_error, found.units.at(name)));
   out << "\nrelative error of the fitted model (what noise alone would leave)\n";
-  for (const auto& [name, channel] : found.channels) {
-    out << fmt::format("  {:<26} {:.3g} % ({:.3g} %)\n", name, 100 * channel.error, 100 * channel.floor);
-  }
+  for (const auto& [name, channel] : found.channels)
+    out << (std::isfinite(channel.error) ? fmt::format("  {:<26} {:.3g} % ({:.3g} %)\n", name,
+                                                       100 * channel.error, 100 * channel.floor)
+                                         : fmt::format("  {:<26} does not vary\n", name));
   for (const std::string& warning : found.warnings) out << "warning: " << warning << '\n';
 }
 

@@ -63,8 +63,8 @@ TraceFolder::~TraceFolder() {
 }
 
 void TraceFolder::write(const identification::Trace& trace, const rig_file::RigFile& declared,
-                        const TraceInputs& inputs) const {
-  write_file(files_.report, trace_report_json(trace, inputs));
+                        const TraceInputs& inputs, const std::vector<report::CheckedFile>& checks) const {
+  write_file(files_.report, report::with_record_check(trace_report_json(trace, inputs), checks));
   write_file(files_.series, trace_series_json(trace));
   write_file(files_.rig, identification::traced_rig_text(declared, trace));
   const std::string plots = report::drawn_figures(kScript, {"--series", files_.series, "--", files_.report});

@@ -31,7 +31,7 @@ std::string fitted_rig_text(const rig_file::RigFile& declared, const Identificat
     document.set_fitted({found.rig, ratio, values_by_table(found.parameters), values_by_table(found.units)});
   else
     document.set_fitted({found.rig, ratio, found.parameters, found.units});
-  if (found.gap_map && gap_varies(declared.rig))
+  if (found.gap_map && gap_varies(declared.rig) && !found.unexplained)
     replace_gap_terms(document, *found.gap_map, found.rig.mesh.backlash / found.rig.mesh.lever());
   document.read();  // what is written can be read
   return document.text();

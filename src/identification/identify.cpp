@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/identify.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -14,7 +17,6 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "fit/joint_fit.h"
-#include "fit/record_sense.h"
 #include "procedures/procedures.h"
 
 namespace backlash::identification {
@@ -28,18 +30,14 @@ void require_finite(const record::Record& record) {
                                        " has no value at t = " + record::time_text(record.time[k]) + " s");
 }
 
-RecordedMotion motion_of(const record::Record& r) {
-  return {r.name, r.sampling_interval(), r.column(record::Channel::motor_torque),
-          r.column(record::Channel::motor_position), r.column(record::Channel::load_position)};
-}
-
 /// A body stands where it moves less than a twentieth of what the other does.
 CaseRecord case_record(const record::Record& record, const model::Rig& declared) {
   CaseRecord r;
   require_finite(record);
-  r.record = record::evenly_sampled(load_side(record, declared));
+  record::EvenGrid even = record::evenly_sampled_grid(load_side(record, declared));
+  r.record = std::move(even.record);
+  r.lost = std::move(even.lost);
   r.has_load = r.record.has(record::Channel::load_position);
-  require_sense(motion_of(r.record), model::load_side(declared));
   if (!r.record.has(record::Channel::motor_position) || !r.has_load) return r;
   const double motor = signal::peak_to_peak(r.record.column(record::Channel::motor_position));
   const double load = signal::peak_to_peak(r.record.column(record::Channel::load_position));
@@ -54,9 +52,6 @@ void read_records(const std::vector<record::Record>& records, const model::Rig& 
   for (const record::Record& record : records) {
     try {
       c.records.push_back(case_record(record, declared));
-      for (const std::string& warning :
-           unit_warnings(motion_of(c.records.back().record), model::load_side(declared)))
-        c.result.warnings.push_back(warning);
     } catch (const BadData& error) {
       if (records.size() == 1) throw;
       c.result.warnings.push_back(std::string("not used: ") + error.what());
@@ -112,6 +107,12 @@ void agree_on_gap(const model::Rig& declared, Identification& result) {
     result.rig.terms = model::load_side(declared).terms;
 }
 
+/// Relative, in per cent; of a channel without a sample that counts, or that is constant, there is none.
+std::string share_text(double relative) {
+  return std::isfinite(relative) ? to_text(std::round(1e4 * relative) / 100) + " %"
+                                 : "an undefined share of a channel that does not vary";
+}
+
 /// The rig declares equal friction in both directions, and the friction lines contradict it.
 void warn_of_asymmetry(IdentificationCase& c) {
   for (const FrictionDetail& d : c.result.friction) {
@@ -130,6 +131,36 @@ void warn_of_asymmetry(IdentificationCase& c) {
 /// Friction of one inertia builds up over a travel after each reversal, which the noise does not know of.
 constexpr double kBuildUp = 0.005;  // simulation: of the torque
 
+/// A channel of which the machine leaves more than this share of the square, beyond noise, is not explained
+/// by it: its mean alone leaves 1.
+constexpr double kMostLeft = 0.5;    // choice
+constexpr double kMostNoise = 0.99;  // theory: of a square; a channel of noise alone shows nothing to explain
+
+double left_beyond_noise(const ChannelError& c) {
+  const double noise = std::min(c.floor * c.floor, kMostNoise);
+  return (c.error * c.error - noise) / (1 - noise);
+}
+
+/// A machine of another kind than the rig file's has no values by this one: a fit makes them anything.
+void withhold_unexplained(Identification& result) {
+  if (result.several) return;
+  for (const auto& [name, channel] : result.channels) {
+    if (left_beyond_noise(channel) <= kMostLeft) continue;  // none of NaN is
+    const std::string reason = fmt::format(
+        "{}: the fitted machine leaves {} where noise alone would leave {}: it is no machine of the "
+        "rig file's kind, and no value is reported that this channel shows; trace_residual looks "
+        "for what the rig file lacks",
+        name, share_text(channel.error), share_text(channel.floor));
+    result.unexplained = result.unexplained ? *result.unexplained + ". " + reason : reason;
+    for (auto& [parameter, measured] : result.parameters) {
+      const bool shown = name == "torque" || result.one_inertia ||
+                         rig_file::told_by_deflection(rig_file::servo_parameter(parameter));
+      if (shown) measured.standard_error = std::numeric_limits<double>::infinity();
+    }
+  }
+  if (result.unexplained) result.warnings.push_back(*result.unexplained);
+}
+
 void warn_of_misfit(Identification& result) {
   if (result.several) {
     result.warnings.push_back(description(*result.several, result.units, false) +
@@ -138,11 +169,14 @@ void warn_of_misfit(Identification& result) {
   }
   const double build_up = result.one_inertia ? kBuildUp : 0;
   for (const auto& [name, channel] : result.channels)
-    if (channel.error > std::max(kMisfit * channel.floor, std::hypot(channel.floor, build_up)))
+    if (left_beyond_noise(channel) <= kMostLeft &&
+        channel.error > std::max(kMisfit * channel.floor, std::hypot(channel.floor, build_up)))
       result.warnings.push_back(
-          name + ": the fitted model leaves " + to_text(std::round(1e4 * channel.error) / 100) +
-          " % where noise alone would leave " + to_text(std::round(1e4 * channel.floor) / 100) +
-          " %: the machine has an effect that the rig file lacks");
+          fmt::format("{}: the fitted model leaves {} where noise alone would leave {}: the machine has an "
+                      "effect that the "
+                      "rig file lacks",
+                      name, share_text(channel.error), share_text(channel.floor)));
+  withhold_unexplained(result);
 }
 
 void require_served(const model::Rig& rig) {

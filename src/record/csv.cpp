@@ -50,6 +50,7 @@ class Reader {
     joints_.front().record.warnings = rows_.warnings();
     for (JointRecord& joint : joints_) {
       joint.record.time = rows_.times;
+      rows_.stamps().count_into(joint.record);
       if (clock_) joint.record.origin = clock_->origin();
     }
     return {std::make_move_iterator(joints_.begin()), std::make_move_iterator(joints_.end())};

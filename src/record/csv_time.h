@@ -49,6 +49,7 @@ class RowTimes {
 
   std::vector<double> times;
   std::vector<std::string> warnings() const;
+  const StampChecker& stamps() const { return stamps_; }
 
  private:
   StampChecker stamps_;

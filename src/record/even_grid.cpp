@@ -6,17 +6,26 @@
 #include <optional>
 
 namespace backlash::record {
+double interpolated(const std::vector<double>& time, const std::vector<double>& y, std::size_t j, double t,
+                    bool cubic) {
+  if (j + 1 >= time.size() || t == time[j]) return y[j];
+  if (!cubic || j == 0 || j + 2 >= time.size())
+    return y[j] + (y[j + 1] - y[j]) * (t - time[j]) / (time[j + 1] - time[j]);
+  double sum = 0;
+  for (std::size_t i = j - 1; i <= j + 2; ++i) {
+    double weight = 1;
+    for (std::size_t k = j - 1; k <= j + 2; ++k)
+      if (k != i) weight *= (t - time[k]) / (time[i] - time[k]);
+    sum += weight * y[i];
+  }
+  return sum;
+}
+
 namespace {
 
 constexpr double kEven =
     1e-3;  // of an interval, off which a stamp moves no sample: choice, far below any jitter
 constexpr double kFarStep = 1e6;  // intervals, of one step: no record of such a gap is one
-
-/// A position goes on as it was; a torque may jump.
-bool smooth(Channel channel) {
-  return channel == Channel::motor_position || channel == Channel::load_position ||
-         channel == Channel::reference_position;
-}
 
 struct Grid {
   std::vector<double> time;      // s, of the rows
@@ -46,22 +55,6 @@ std::optional<Grid> grid_of(const std::vector<double>& time, double median) {
   return g;
 }
 
-/// Between samples j and j + 1 the line, or Lagrange's cubic through the two to either side.
-double between(const std::vector<double>& time, const std::vector<double>& y, std::size_t j, double t,
-               bool cubic) {
-  if (j + 1 >= time.size() || t == time[j]) return y[j];
-  if (!cubic || j == 0 || j + 2 >= time.size())
-    return y[j] + (y[j + 1] - y[j]) * (t - time[j]) / (time[j + 1] - time[j]);
-  double sum = 0;
-  for (std::size_t i = j - 1; i <= j + 2; ++i) {
-    double weight = 1;
-    for (std::size_t k = j - 1; k <= j + 2; ++k)
-      if (k != i) weight *= (t - time[k]) / (time[i] - time[k]);
-    sum += weight * y[i];
-  }
-  return sum;
-}
-
 /// Samples taken at `time`, at the rows of the grid.
 std::vector<double> at_rows(const Grid& g, const std::vector<double>& time, const std::vector<double>& y,
                             bool cubic) {
@@ -70,7 +63,7 @@ std::vector<double> at_rows(const Grid& g, const std::vector<double>& time, cons
   std::size_t j = 0;
   for (const double t : g.time) {
     while (j + 1 < time.size() && time[j + 1] <= t) ++j;
-    rows.push_back(between(time, y, j, t, cubic));
+    rows.push_back(interpolated(time, y, j, t, cubic));
   }
   return rows;
 }
@@ -101,6 +94,11 @@ std::vector<double> sampled_at(const Record& record, const Grid& g) {
 
 }  // namespace
 
+bool is_smooth(Channel channel) {
+  return channel == Channel::motor_position || channel == Channel::load_position ||
+         channel == Channel::reference_position;
+}
+
 std::size_t EvenGrid::count(std::size_t first, std::size_t rows) const {
   const auto begin = lost.begin() + static_cast<std::ptrdiff_t>(first);
   return static_cast<std::size_t>(std::count(begin, begin + static_cast<std::ptrdiff_t>(rows), false));
@@ -116,7 +114,7 @@ EvenGrid even_grid(const Record& record) {
   even.record.time = grid->time;
   for (const Channel channel : kChannels)
     if (record.has(channel))
-      even.record.column(channel) = at_rows(*grid, time, record.column(channel), smooth(channel));
+      even.record.column(channel) = at_rows(*grid, time, record.column(channel), is_smooth(channel));
   return even;
 }
 

@@ -246,6 +246,7 @@ Record MappedCsv::read() {
   if (rows_.times.empty()) throw BadData(name_, "no data: there are only column names");
   mark_.finish(lines_);
   record_.warnings = rows_.warnings();
+  rows_.stamps().count_into(record_);
   record_.time = std::move(rows_.times);
   record_.origin = clock_->origin();
   return std::move(record_);

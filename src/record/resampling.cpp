@@ -7,37 +7,68 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/time_base.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash::record {
+namespace {
 
-Record evenly_sampled(const Record& record) {
-  const std::size_t n = record.size();
+constexpr double kKept = 0.4;  // choice: of a sampling rate, that a low-pass keeps before it
+
+EvenGrid on_grid(const EvenGrid& from, double interval) {
+  const Record& record = from.record;
+  EvenGrid out;
+  out.record.name = record.name;
+  out.record.warnings = record.warnings;
+  out.record.origin = record.origin;
+  std::size_t j = 0;
+  for (double t = record.time.front(); t <= record.time.back();
+       t = record.time.front() + double(out.record.time.size()) * interval) {
+    while (j + 2 < record.size() && record.time[j + 1] < t) ++j;
+    out.record.time.push_back(t);
+    out.lost.push_back(from.lost[j] || from.lost[j + 1]);
+    for (const Channel channel : kChannels)
+      if (const auto& in = record.column(channel); !in.empty())
+        out.record.column(channel).push_back(interpolated(record.time, in, j, t, is_smooth(channel)));
+  }
+  return out;
+}
+
+EvenGrid even_rows(const Record& record, double longest) {
   const double interval = record.sampling_interval();
-  if (n < 4) throw BadData(record.name, "has only " + std::to_string(n) + " samples");
-  const double even = (record.time.back() - record.time.front()) / double(n - 1);
-  double worst = 0;
-  for (std::size_t k = 0; k < n; ++k)
-    worst = std::max(worst, std::fabs(record.time[k] - record.time.front() - double(k) * even));
-  if (worst <= 0.01 * even) return record;
-  for (std::size_t k = 1; k < n; ++k)
-    if (record.time[k] - record.time[k - 1] > kGapFactor * interval)
+  if (record.size() < 4) throw BadData(record.name, "has only " + std::to_string(record.size()) + " samples");
+  for (std::size_t k = 1; k < record.size(); ++k)
+    if (record.time[k] - record.time[k - 1] > longest * interval)
       throw BadData(record.name, "a gap of " + to_text(record.time[k] - record.time[k - 1]) +
                                      " s after t = " + time_text(record.time[k - 1]) +
                                      " s: give the parts as records of their own");
-  Record out;
-  out.name = record.name;
-  out.warnings = record.warnings;
-  std::size_t j = 0;
-  for (double t = record.time.front(); t <= record.time.back();
-       t = record.time.front() + double(out.time.size()) * interval) {
-    while (j + 2 < n && record.time[j + 1] < t) ++j;
-    const double u = (t - record.time[j]) / (record.time[j + 1] - record.time[j]);
-    out.time.push_back(t);
-    for (const Channel channel : kChannels)
-      if (const auto& in = record.column(channel); !in.empty())
-        out.column(channel).push_back((1 - u) * in[j] + u * in[j + 1]);
-  }
-  return out;
+  EvenGrid grid = even_grid(record);
+  const std::vector<double>& time = grid.record.time;
+  const double even = (time.back() - time.front()) / double(time.size() - 1);
+  double worst = 0;
+  for (std::size_t k = 0; k < time.size(); ++k)
+    worst = std::max(worst, std::fabs(time[k] - time.front() - double(k) * even));
+  return worst <= 0.01 * even ? grid : on_grid(grid, interval);
+}
+
+}  // namespace
+
+EvenGrid evenly_sampled_grid(const Record& record) {
+  return even_rows(record, kLongestFilled);
+}
+
+Record evenly_sampled(const Record& record) {
+  return even_rows(record, kGapFactor).record;
+}
+
+EvenGrid resampled(const Record& record, double interval) {
+  EvenGrid grid = evenly_sampled_grid(record);
+  const double own = grid.record.sampling_interval();
+  if (!(interval >= own))
+    throw InvalidParameter("interval", interval, "must be that of the record or longer");
+  for (const Channel channel : kChannels)
+    if (std::vector<double>& column = grid.record.column(channel); !column.empty() && !is_smooth(channel))
+      column = signal::low_pass(column, own, kKept / interval);
+  return on_grid(grid, interval);
 }
 
 }  // namespace backlash::record

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
@@ -123,6 +125,50 @@ Record joined(const std::vector<Record>& parts) {
     all.warnings.push_back(fmt::format("{} of {} samples left out, as another topic was silent there",
                                        left_out, parts.front().size()));
   return all;
+}
+
+void set_origin(Record& record, double origin) {
+  const double later = record.origin - origin;
+  if (later != 0)
+    for (double& time : record.time) time += later;
+  record.first_repeated_stamp += later;
+  record.origin = origin;
+}
+
+void share_time_base(std::vector<Record>& joints) {
+  if (joints.empty()) return;
+  const double origin = joints.front().origin;
+  Record base;
+  base.name = joints.front().name;
+  base.time = joints.front().time;
+  std::vector<double> common = base.time;
+  for (Record& joint : joints) {
+    set_origin(joint, origin);
+    if (joint.time == base.time) continue;
+    Record here = joint;
+    here.warnings.clear();
+    const std::vector<std::string> warnings = std::move(joint.warnings);
+    joint = joined({base, here});
+    joint.warnings = warnings;
+    joint.origin = origin;
+    std::vector<double> both;
+    std::set_intersection(common.begin(), common.end(), joint.time.begin(), joint.time.end(),
+                          std::back_inserter(both));
+    common = std::move(both);
+  }
+  if (common.empty()) throw BadData(base.name, "its joints have no time in common");
+  if (common.size() == base.size()) return;
+  for (Record& joint : joints) {
+    std::vector<std::string> warnings = std::move(joint.warnings);
+    joint = samples_at(joint, common);
+    joint.origin = origin;
+    joint.warnings = std::move(warnings);
+  }
+  joints.front().warnings.push_back(
+      fmt::format("{} of {} samples ({:.3g} s) left out, as the messages of other joints begin later, end "
+                  "earlier or have a gap there",
+                  base.size() - common.size(), base.size(),
+                  double(base.size() - common.size()) * base.sampling_interval()));
 }
 
 }  // namespace backlash::record

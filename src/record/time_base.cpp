@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash::record {
@@ -42,6 +43,11 @@ StampVerdict StampChecker::next(double stamp) {
   last_ = stamp;
   ++accepted_;
   return StampVerdict::accept;
+}
+
+void StampChecker::count_into(Record& record) const {
+  record.repeated_stamps = repeated_;
+  record.first_repeated_stamp = first_repeated_;
 }
 
 std::string StampChecker::describe(const std::string& where) const {

@@ -21,6 +21,12 @@ namespace {
 
 constexpr std::uint64_t kBlock = 1 << 16;  // bytes that are read at once of what is skipped
 
+/// Of the file, not of what a message holds: nothing behind it is read.
+class Damage : public BadData {
+ public:
+  Damage(const std::string& where, const std::string& reason) : BadData(where, "damaged: " + reason) {}
+};
+
 /// The fields of a record, one after the other.
 class Fields {
  public:
@@ -45,7 +51,7 @@ class Fields {
   }
   std::size_t left() const { return size_ - place_; }
   const std::string& where() const { return where_; }
-  [[noreturn]] void fail(const std::string& reason) const { throw BadData(where_, "damaged: " + reason); }
+  [[noreturn]] void fail(const std::string& reason) const { throw Damage(where_, reason); }
 
  private:
   const std::uint8_t* data_;
@@ -65,13 +71,6 @@ struct Channel {
   bool wanted = false;
 };
 
-struct Message {
-  std::uint64_t log_time;
-  const Channel* channel;
-  const std::uint8_t* data;
-  std::size_t size;
-};
-
 /// One pass over a file.
 class Pass {
  public:
@@ -83,11 +82,13 @@ class Pass {
   }
 
   void run() {
-    std::array<char, kMagic.size()> magic{};
-    if (size_ < magic.size()) throw BadData(path_, "no MCAP file: it does not begin with its magic");
+    std::array<char, kMagic.size()> magic{};  // which is that of the format, see open_mcap()
     get(magic.data(), magic.size());
-    if (magic != kMagic) throw BadData(path_, "no MCAP file: it does not begin with its magic");
-    while (next()) {
+    try {
+      while (next()) {
+      }
+    } catch (const Damage& damage) {
+      cut = std::string(damage.what()) + "; nothing behind it was read";
     }
   }
 
@@ -106,7 +107,7 @@ class Pass {
 
   void get(void* to, std::uint64_t count) {
     in_.read(static_cast<char*>(to), static_cast<std::streamsize>(count));
-    if (static_cast<std::uint64_t>(in_.gcount()) != count) throw BadData(where(place_), "cannot be read");
+    if (static_cast<std::uint64_t>(in_.gcount()) != count) throw Damage(where(place_), "cannot be read");
     place_ += count;
     crc_.process_bytes(to, static_cast<std::size_t>(count));
   }
@@ -127,8 +128,8 @@ class Pass {
       return true;
     }
     if (length > kMostBytes)
-      throw BadData(where(start),
-                    fmt::format("a record of {} bytes; at most {} can be read", length, kMostBytes));
+      throw Damage(where(start),
+                   fmt::format("a record of {} bytes; at most {} can be read", length, kMostBytes));
     content_.resize(static_cast<std::size_t>(length));
     get(content_.data(), length);
     Fields fields(content_.data(), content_.size(), where(start));
@@ -159,14 +160,16 @@ class Pass {
     in_.seekg(-static_cast<std::streamoff>(end.size()), std::ios::end);
     in_.read(end.data(), end.size());
     if (start != kMagic.size() && end == kMagic)
-      throw BadData(where(start), "damaged: a record does not fit into the file");
+      throw Damage(where(start), "a record does not fit into the file");
     cut = fmt::format("the file was cut off: nothing after byte {} is whole, nothing there was read", start);
     return false;
   }
 
   bool end_of_data(Fields& fields, std::uint32_t crc_before) {
     const auto crc = fields.number<std::uint32_t>();
-    if (crc != 0 && crc != crc_before) fields.fail("the data do not have their check sum");
+    // Somewhere, nobody knows where.
+    if (crc != 0 && crc != crc_before)
+      throw BadData(fields.where(), "damaged: the data do not have their check sum");
     data_ended_ = true;
     crc_.reset();  // of the summary begins here
     summary_start_ = place_;
@@ -216,8 +219,12 @@ class Pass {
     if (size > kMostBytes)
       fields.fail(fmt::format("a chunk of {} bytes; at most {} can be read", size, kMostBytes));
     Bytes records;
-    unpack(compression, data, static_cast<std::size_t>(packed), static_cast<std::size_t>(size),
-           fields.where(), records);
+    try {
+      unpack(compression, data, static_cast<std::size_t>(packed), static_cast<std::size_t>(size),
+             fields.where(), records);
+    } catch (const BadData& error) {
+      fields.fail(error.what());
+    }
     if (crc != 0 && crc != crc_of(records.data(), records.size()))
       fields.fail("the chunk does not have its check sum");
     Fields inside(records.data(), records.size(), fields.where() + " (chunk)");
@@ -228,9 +235,11 @@ class Pass {
       Fields record(inside.bytes(length), static_cast<std::size_t>(length), inside.where());
       take(opcode, record, &messages);
     }
-    const auto earlier = [](const Message& a, const Message& b) { return a.log_time < b.log_time; };
-    std::stable_sort(messages.begin(), messages.end(), earlier);
-    for (const Message& message : messages) take_(message.channel->topic, message.data, message.size);
+    const auto earlier = [](const Message* a, const Message* b) { return a->time < b->time; };
+    std::vector<const Message*> order;
+    for (const Message& message : messages) order.push_back(&message);
+    std::stable_sort(order.begin(), order.end(), earlier);
+    for (const Message* message : order) take_(*message);
   }
 
   /// A record of the data; messages of a chunk are put by.
@@ -249,11 +258,11 @@ class Pass {
       const auto log_time = fields.number<std::uint64_t>();
       fields.bytes(8);  // time of publishing
       const std::size_t size = fields.left();
-      const Message message{log_time, &channel->second, fields.bytes(size), size};
+      const Message message{channel->second.topic, log_time, fields.bytes(size), size};
       if (later)
         later->push_back(message);
       else
-        take_(message.channel->topic, message.data, message.size);
+        take_(message);
     }
   }
 
@@ -287,7 +296,7 @@ class Mcap : public Recording {
   explicit Mcap(const std::string& path) : path_(path) {}
 
   std::vector<Topic> topics() override {
-    const Take nothing = [](const std::string&, const std::uint8_t*, std::size_t) {};
+    const Take nothing = [](const Message&) {};
     Pass pass(path_, {}, nothing);
     pass.run();
     if (pass.found().empty() && !pass.cut.empty()) throw BadData(path_, pass.cut);
@@ -312,7 +321,10 @@ class Mcap : public Recording {
 }  // namespace
 
 std::unique_ptr<Recording> open_mcap(const std::string& path) {
-  open_input(path);  // its errors name the reason
+  std::ifstream in = open_input(path);  // its errors name the reason
+  std::array<char, kMagic.size()> magic{};
+  if (!in.read(magic.data(), magic.size()) || magic != kMagic)
+    throw BadData(path, "no MCAP file: it does not begin with its magic");
   return std::make_unique<Mcap>(path);
 }
 

@@ -72,14 +72,16 @@ class Sqlite : public Recording {
       const std::int64_t id = sqlite3_column_int64(row, 0);
       if (wanted.emplace(id, name).second) ids += fmt::format("{}{}", ids.empty() ? "" : ",", id);
     });
-    each_row("SELECT topic_id, data, id FROM messages WHERE topic_id IN (" + ids + ") ORDER BY timestamp, id",
+    each_row("SELECT topic_id, data, id, timestamp FROM messages WHERE topic_id IN (" + ids +
+                 ") ORDER BY timestamp, id",
              [&](sqlite3_stmt* row) {
                const auto topic = wanted.find(sqlite3_column_int64(row, 0));
                if (topic == wanted.end() || sqlite3_column_type(row, 1) != SQLITE_BLOB)
                  throw BadData(
                      path_, fmt::format("damaged: messages, id {}: no bytes", sqlite3_column_int64(row, 2)));
                const auto* data = static_cast<const std::uint8_t*>(sqlite3_column_blob(row, 1));
-               take(topic->second, data, static_cast<std::size_t>(sqlite3_column_bytes(row, 1)));
+               take({topic->second, static_cast<std::uint64_t>(sqlite3_column_int64(row, 3)), data,
+                     static_cast<std::size_t>(sqlite3_column_bytes(row, 1))});
              });
   }
 

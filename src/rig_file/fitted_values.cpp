@@ -25,7 +25,9 @@ std::string fitted_comment(const FittedValues& found, const std::string& name, d
 bool is_worth_writing(const FittedValues& found, const YamlTree& tree) {
   const RigParameter& skew = servo_parameter(RigPart::sensors, ParameterKind::encoder_skew);
   const signal::Measured& m = found.parameters.at(skew.name);
-  return tree.root->entries.at("sensors").value->entries.count(skew.name) > 0 ||
+  const auto sensors = tree.root->entries.find("sensors");
+  if (sensors == tree.root->entries.end()) return false;
+  return sensors->second.value->entries.count(skew.name) > 0 ||
          std::fabs(m.value) > kClear * m.standard_error;
 }
 
@@ -39,7 +41,9 @@ const YamlNode& part_of(const YamlTree& tree, std::string_view part) {
 void RigDocument::set_fitted(const FittedValues& found) {
   const model::Rig& rig = found.rig;
   for (const RigParameter& p : servo_parameters()) {
-    if (found.parameters.count(p.name) == 0 || p.key.empty()) continue;
+    const auto measured = found.parameters.find(p.name);
+    if (measured == found.parameters.end() || p.key.empty()) continue;
+    if (std::isinf(measured->second.standard_error)) continue;  // not determined: stays as declared
     if (p.kind == ParameterKind::encoder_skew && !is_worth_writing(found, tree())) continue;
     const double divisor = std::pow(found.motor_axis_ratio, p.ratio_power);
     const std::string comment = fitted_comment(found, p.name, divisor);
@@ -58,7 +62,7 @@ void RigDocument::set_directional(const std::string& key, double mean, double as
   const std::size_t dot = key.rfind('.'), first = key.find('.') + 1;
   const YamlNode& part = part_of(read, key.substr(first, dot - first));
   const auto found = part.entries.find(key.substr(dot + 1));
-  if (found != part.entries.end() && found->second.value->kind == YamlNode::Kind::map) {
+  if (found != part.entries.end() && found->second.value->entries.count("forward") > 0) {
     set(key + ".forward", mean + asymmetry, comment);
     set(key + ".backward", mean - asymmetry, comment);
   } else if (asymmetry != 0) {

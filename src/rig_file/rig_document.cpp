@@ -11,6 +11,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 
 namespace backlash::rig_file {
 namespace {
@@ -44,52 +45,6 @@ bool has_dash(const std::string& line) {
   return !says_nothing(line) && line[column_of(line)] == '-';
 }
 
-/// Puts `value` where the scalar of "key: scalar  # comment" stands; false where the line is not of that
-/// form.
-bool replace_scalar(std::string& line, const std::string& key, const std::string& scalar,
-                    const std::string& value, const std::string& comment) {
-  const std::size_t begin = column_of(line);
-  if (begin == std::string::npos || line.compare(begin, key.size() + 1, key + ":") != 0) return false;
-  const std::size_t at = line.find_first_not_of(' ', begin + key.size() + 1);
-  if (at == std::string::npos || line.compare(at, scalar.size(), scalar) != 0) return false;
-  const std::string rest = line.substr(at + scalar.size());
-  if (!trimmed(rest).empty() && trimmed(rest).front() != '#') return false;
-  const std::size_t column = line.find('#', at + scalar.size());
-  line = line.substr(0, at) + value;
-  line = comment.empty() ? line + rest
-                         : with_comment(line, comment, column == std::string::npos ? kCommentColumn : column);
-  return true;
-}
-
-/// The same for "key: {...}  # comment".
-bool replace_map(std::string& line, const std::string& key, const std::string& value,
-                 const std::string& comment) {
-  const std::size_t begin = column_of(line), open = line.find('{'), close = line.find('}');
-  if (begin == std::string::npos || line.compare(begin, key.size() + 1, key + ":") != 0) return false;
-  if (close == std::string::npos || line.find('{', open + 1) < close) return false;
-  return replace_scalar(line, key, line.substr(open, close + 1 - open), value, comment);
-}
-
-/// The same for one entry of "name: {..., key: scalar, ...}"; without `scalar` the entry is new.
-bool replace_in_map(std::string& line, const std::string& key, const std::string& scalar,
-                    const std::string& value) {
-  const std::size_t open = line.find('{');
-  if (open == std::string::npos) return false;
-  if (scalar.empty()) {
-    line.insert(open + 1, key + ": " + value + ", ");
-    return true;
-  }
-  const std::string old = key + ": " + scalar;
-  for (std::size_t at = line.find(old, open); at != std::string::npos; at = line.find(old, at + 1)) {
-    const std::size_t end = at + old.size();
-    const bool whole = end < line.size() && (line[end] == ',' || line[end] == '}' || line[end] == ' ');
-    if (!whole || (line[at - 1] != ' ' && line[at - 1] != '{')) continue;
-    line.replace(at, old.size(), key + ": " + value);
-    return true;
-  }
-  return false;
-}
-
 /// The lines of entries that are indented by two, at another column.
 std::vector<std::string> indented(const std::vector<std::string>& entries, std::size_t column) {
   std::vector<std::string> lines;
@@ -119,44 +74,92 @@ RigFile RigDocument::read() const {
   return rig_file_from_text(text(), name_);
 }
 
+RigDocument::Place RigDocument::begin_of(const YamlNode& node) const {
+  return {std::size_t(node.line) - 1, std::size_t(node.column)};
+}
+
+/// Behind the last character of a scalar, or of a list or map in brackets.
+RigDocument::Place RigDocument::end_of(const YamlNode& node, const std::string& key) const {
+  Place at = begin_of(node);
+  const auto refuse = [&](const std::string& reason) {
+    throw BadData(fmt::format("{}:{}", name_, node.line), key + ": " + reason);
+  };
+  const bool brackets = node.flow;
+  if (node.kind == YamlNode::Kind::plain) {
+    if (lines_.at(at.line).compare(at.column, node.scalar.size(), node.scalar) != 0)
+      refuse("is no plain value on one line");
+    return {at.line, at.column + node.scalar.size()};
+  }
+  if (node.kind == YamlNode::Kind::null || (!brackets && node.kind != YamlNode::Kind::quoted))
+    refuse("is neither a value nor in brackets");
+  int depth = 0;
+  char quote = 0;
+  for (; at.line < lines_.size(); ++at.line, at.column = 0) {
+    const std::string& line = lines_[at.line];
+    for (; at.column < line.size(); ++at.column) {
+      const char c = line[at.column];
+      if (quote == '"' && c == '\\')
+        ++at.column;
+      else if (quote != 0 && c == quote)
+        quote = 0;  // a doubled one opens again
+      else if (quote == 0 && (c == '"' || c == '\''))
+        quote = c;
+      else if (quote == 0 && c == '#' && (at.column == 0 || line[at.column - 1] == ' '))
+        break;
+      else if (quote == 0)
+        depth += (c == '[' || c == '{') - (c == ']' || c == '}');
+      if (quote == 0 && depth == 0) return {at.line, at.column + 1};
+    }
+  }
+  refuse("does not end");
+  return at;
+}
+
+/// In its place. A comment stands behind the only value of a line.
+void RigDocument::replace(const YamlNode& node, const std::string& key, const std::string& value,
+                          const std::string& comment) {
+  const Place begin = begin_of(node), end = end_of(node, key);
+  const std::string rest = lines_[end.line].substr(end.column);
+  const std::size_t note = rest.find('#');
+  std::string line = lines_[begin.line].substr(0, begin.column) + value;
+  if (comment.empty() || trimmed(rest.substr(0, note)).size() > 0)
+    line += rest;
+  else
+    line = with_comment(line, comment, note == std::string::npos ? kCommentColumn : end.column + note);
+  lines_[begin.line] = line;
+  lines_.erase(lines_.begin() + std::ptrdiff_t(begin.line) + 1,
+               lines_.begin() + std::ptrdiff_t(end.line) + 1);
+}
+
+/// As the first of its map.
+void RigDocument::insert(const YamlNode& map, const std::string& key, const std::string& value,
+                         const std::string& comment) {
+  const Place begin = begin_of(map);
+  std::string& line = lines_.at(begin.line);
+  if (map.flow) {
+    line.insert(begin.column + 1, key + ": " + value + (map.entries.empty() ? "" : ", "));
+    return;
+  }
+  const std::string indent(begin.column, ' ');
+  lines_.insert(lines_.begin() + std::ptrdiff_t(begin.line),
+                with_comment(indent + key + ": " + value, comment));
+}
+
 void RigDocument::set(const std::string& key, const std::string& value, const std::string& comment) {
   const YamlTree read = tree();
   const std::vector<std::string> path = split(key, '.');
   const YamlNode* map = read.root;
-  int line = 0;  // of the key whose map this is
-  const auto in_braces = [&] {
-    return map != read.root && map->line == line &&
-           lines_.at(std::size_t(line) - 1).find('{') != std::string::npos;
-  };
   for (std::size_t depth = 0; depth < path.size(); ++depth) {
     const auto found = map->entries.find(path[depth]);
     const bool last = depth + 1 == path.size();
     if (found == map->entries.end()) {
-      if (!last || map->entries.empty()) throw BadData(name_, key + ": its map is missing");
-      if (in_braces() && replace_in_map(lines_.at(std::size_t(line) - 1), path[depth], "", value)) return;
-      const auto before = std::ptrdiff_t(map->line) - 1;  // of the first key in the map
-      const std::string indent(column_of(lines_.at(before)), ' ');
-      lines_.insert(lines_.begin() + before, with_comment(indent + path[depth] + ": " + value, comment));
-      return;
+      if (!last || (map->entries.empty() && !map->flow)) throw BadData(name_, key + ": its map is missing");
+      return insert(*map, path[depth], value, comment);
     }
-    const YamlEntry& entry = found->second;
-    if (!last) {
-      if (entry.value->kind != YamlNode::Kind::map)
-        throw BadData(name_, key + ": " + path[depth] + " is no map");
-      map = entry.value;
-      line = entry.line;
-    } else if (in_braces()) {
-      if (entry.value->kind != YamlNode::Kind::plain ||
-          !replace_in_map(lines_.at(std::size_t(line) - 1), path[depth], entry.value->scalar, value))
-        throw BadData(fmt::format("{}:{}", name_, entry.line),
-                      key + ": is no plain value of a map on a line");
-    } else if (entry.value->kind == YamlNode::Kind::map) {
-      if (!replace_map(lines_.at(entry.line - 1), path[depth], value, comment))
-        throw BadData(fmt::format("{}:{}", name_, entry.line), key + ": is no map on a line of its own");
-    } else if (!replace_scalar(lines_.at(entry.line - 1), path[depth], entry.value->scalar, value, comment)) {
-      throw BadData(fmt::format("{}:{}", name_, entry.line),
-                    key + ": is no plain value on a line of its own");
-    }
+    const YamlNode& node = *found->second.value;
+    if (last) return replace(node, key, value, map->flow ? "" : comment);
+    if (node.kind != YamlNode::Kind::map) throw BadData(name_, key + ": " + path[depth] + " is no map");
+    map = &node;
   }
 }
 
@@ -182,16 +185,22 @@ void RigDocument::set_contact_law(const model::ContactSpec& contact) {
   const YamlTree read = tree();
   const YamlNode& declared =
       *read.root->entries.at("gear_train").value->entries.at("mesh").value->entries.at("contact").value;
-  std::set<int, std::greater<>> dropped;  // lines, the last one first
-  for (const auto& [key, entry] : declared.entries)
-    if (key != "law" && !contact.values.has(key)) dropped.insert(entry.line);
-  for (const int line : dropped) lines_.erase(lines_.begin() + line - 1);
-  set("gear_train.mesh.contact.law", contact.law);
-  for (const model::ContactLawType& type : model::contact_laws()) {
-    if (type.name != contact.law) continue;
-    for (const ParameterSpec& spec : type.parameters)
-      set("gear_train.mesh.contact." + spec.name, contact.values.at(spec.name), spec.unit);
+  const auto type = std::find_if(model::contact_laws().begin(), model::contact_laws().end(),
+                                 [&](const model::ContactLawType& each) { return each.name == contact.law; });
+  const std::string key = "gear_train.mesh.contact";
+  if (declared.flow) {
+    std::string values = "{law: " + contact.law;
+    for (const ParameterSpec& spec : type->parameters)
+      values += fmt::format(", {}: {:.6g}", spec.name, contact.values.at(spec.name));
+    return replace(declared, key, values + "}", "");
   }
+  std::set<int, std::greater<>> dropped;  // lines, the last one first
+  for (const auto& [name, entry] : declared.entries)
+    if (name != "law" && !contact.values.has(name)) dropped.insert(entry.line);
+  for (const int line : dropped) lines_.erase(lines_.begin() + line - 1);
+  set(key + ".law", contact.law);
+  for (const ParameterSpec& spec : type->parameters)
+    set(key + "." + spec.name, contact.values.at(spec.name), spec.unit);
 }
 
 void RigDocument::set_whole_path_of_test_runs() {
@@ -203,13 +212,41 @@ void RigDocument::set_whole_path_of_test_runs() {
   set("test_runs", quoted.str());
 }
 
+/// A list in brackets gets a line for each item; what stands in them stays as it is.
+void RigDocument::list_by_lines(const std::string& key) {
+  const YamlTree read = tree();
+  const auto found = read.root->entries.find(key);
+  if (found == read.root->entries.end() || !found->second.value->flow) return;
+  const YamlNode& list = *found->second.value;
+  Lines items;
+  for (const YamlNode* node : list.items) {
+    const Place begin = begin_of(*node), end = end_of(*node, key);
+    std::string text;
+    for (std::size_t k = begin.line; k <= end.line; ++k) {
+      const std::size_t from = k == begin.line ? begin.column : 0;
+      text +=
+          (k == begin.line ? "" : "\n    ") +
+          std::string(trimmed(lines_[k].substr(from, k == end.line ? end.column - from : std::string::npos)));
+    }
+    for (const std::string& line : split("  - " + text, '\n')) items.push_back(line);
+  }
+  if (items.empty()) return;
+  const Place end = end_of(list, key);
+  const std::size_t behind = end.line + 1;
+  const std::string rest = std::string(trimmed(lines_[end.line].substr(end.column)));
+  std::string& head = lines_[begin_of(list).line];
+  head = std::string(trimmed(head.substr(0, begin_of(list).column))) + (rest.empty() ? "" : "  " + rest);
+  const auto first = lines_.erase(lines_.begin() + std::ptrdiff_t(begin_of(list).line) + 1,
+                                  lines_.begin() + std::ptrdiff_t(behind));
+  lines_.insert(first, items.begin(), items.end());
+}
+
 RigDocument::Item RigDocument::item(const YamlEntry& list, const YamlNode& node) const {
   const auto key = std::size_t(list.line) - 1;
   std::size_t begin = std::size_t(node.line) - 1;
   while (begin > key && !has_dash(lines_[begin])) --begin;
   if (begin == key)
-    throw BadData(fmt::format("{}:{}", name_, list.line),
-                  "terms: must have a line for each value (block style) to be changed");
+    throw BadData(fmt::format("{}:{}", name_, list.line), "terms: an item has no line of its own");
   Item item{begin, begin + 1, column_of(lines_[begin])};
   for (std::size_t k = item.end; k < lines_.size(); ++k) {
     if (says_nothing(lines_[k])) continue;
@@ -221,6 +258,7 @@ RigDocument::Item RigDocument::item(const YamlEntry& list, const YamlNode& node)
 
 void RigDocument::append_terms(const std::vector<std::string>& entries, const std::string& comment) {
   if (entries.empty()) return;
+  list_by_lines("terms");
   const YamlTree read = tree();
   const YamlEntry* terms = find_terms(read);
   if (terms != nullptr && !terms->value->items.empty()) {
@@ -235,14 +273,25 @@ void RigDocument::append_terms(const std::vector<std::string>& entries, const st
   lines_.insert(lines_.end(), lines.begin(), lines.end());
 }
 
-void RigDocument::check_terms() const {
-  const YamlTree read = tree();
-  const YamlEntry* terms = find_terms(read);
-  if (terms != nullptr && !terms->value->items.empty()) item(*terms, *terms->value->items.back());
+void RigDocument::check_changes(const model::Rig& declared) const {
+  RigDocument copy = *this;
+  if (!declared.mesh.rigid) copy.set_contact_law(declared.mesh.contact_spec());
+  const model::Rig rig = model::load_side(declared);
+  std::map<std::string, signal::Measured> parameters;
+  std::map<std::string, std::string> units;
+  for (const RigParameter& p : servo_parameters()) {
+    const bool skew = p.kind == ParameterKind::encoder_skew;
+    if (!p.known_to(declared) || (p.get(declared) == 0 && !skew)) continue;
+    parameters[p.name] = {p.get(rig) + (skew ? 1 : 0), 0};  // one that is found makes a new line
+    units[p.name] = p.unit;
+  }
+  copy.set_fitted({rig, declared.motor_axis_ratio(), parameters, units});
+  copy.append_terms({"  - id: gravity\n"}, "");
 }
 
 void RigDocument::replace_terms(const std::function<bool(const std::string&)>& is_old,
                                 const std::vector<std::string>& entries) {
+  list_by_lines("terms");
   const YamlTree read = tree();
   std::vector<Item> old;
   if (const YamlEntry* terms = find_terms(read))

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "backlash_diagnosis/base/digest.h"
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/yaml_tree.h"
 #include "backlash_diagnosis/rig_file/channels.h"
@@ -244,6 +245,20 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
 
 RigFile load_rig_file(const std::string& path) {
   return rig_file_from_text(read_start(path, kLargestYaml + 1), path);  // one more than the parser takes
+}
+
+bool is_urdf(const std::string& path) {
+  const std::string start = read_start(path, 4096);
+  const std::size_t first = start.find_first_not_of(" \t\r\n\xef\xbb\xbf");
+  return first != std::string::npos && start[first] == '<';
+}
+
+bool is_arm_rig(const std::string& path) {
+  if (is_urdf(path))
+    throw BadData(path,
+                  "is a URDF: what is needed is a rig file, which names it and tells the drives; "
+                  "plan_motion writes one (--write-rig) to begin with");
+  return YamlReader::from_file(path).has("urdf");
 }
 
 RigFile default_rig_file() {

@@ -59,12 +59,15 @@ bool BagDelivery::add(std::uint64_t place, std::string_view records) {
     else
       kept_.push_back({entry.received, entry.connection, std::string(message)});
   }
-  if (!chunk.ends) return true;
+  if (chunk.ends) finish();
+  return true;
+}
+
+void BagDelivery::finish() {
   std::stable_sort(kept_.begin(), kept_.end(),
                    [](const Kept& a, const Kept& b) { return a.received < b.received; });
   for (const Kept& kept : kept_) take_(kept.connection, kept.message);
   kept_.clear();
-  return true;
 }
 
 }  // namespace backlash::ros_bridge

@@ -28,6 +28,9 @@ class BagDelivery {
   /// False where the index points to no message.
   bool add(std::uint64_t place, std::string_view records);
 
+  /// Hands on what was kept, where no more chunks follow.
+  void finish();
+
  private:
   struct Planned {
     std::uint64_t place;

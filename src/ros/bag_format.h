@@ -78,11 +78,11 @@ class Fields {
   std::vector<std::pair<std::string_view, std::string_view>> all_;
 };
 
-/// A record of a chunk: its operation (-1 where it has none) and data, and where it begins.
+/// A record of a chunk: its operation (-1 where it has none), header and data, and where it begins.
 struct ChunkRecord {
   std::uint32_t offset = 0;
   int operation = -1;
-  std::string_view data;
+  std::string_view header, data;
 };
 
 enum class Step { record, end, bad_length, bad_header };
@@ -97,10 +97,9 @@ class ChunkRecords {
     if (rest_.empty()) return Step::end;
     record.offset = static_cast<std::uint32_t>(bytes_.size() - rest_.size());
     record.operation = -1;
-    std::string_view header;
-    if (!take_part(rest_, header)) return Step::bad_length;
+    if (!take_part(rest_, record.header)) return Step::bad_length;
     bool known = false;  // of several the first
-    const bool whole = take_fields(header, [&](std::string_view name, std::string_view value) {
+    const bool whole = take_fields(record.header, [&](std::string_view name, std::string_view value) {
       if (!known && name == "op") known = true, record.operation = operation_of(value);
     });
     if (!whole) return Step::bad_header;

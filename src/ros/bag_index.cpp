@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
 #include "bag_format.h"
+#include "bag_structure.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -132,10 +133,53 @@ class IndexReader {
   std::set<std::uint32_t> with_messages_;
 };
 
+/// Collects what the records of chunks say of themselves.
+class IndexBuilder {
+ public:
+  void add(std::uint64_t place, std::string_view records) {
+    BagIndex::Chunk chunk{place, {}};
+    ChunkRecords from(records);
+    for (ChunkRecord record; from.next(record) == Step::record;) {
+      if (!fields_.parse(record.header) || fields_.at("conn").size() < 4) continue;
+      const std::uint32_t connection = number_at(fields_.at("conn").data());
+      if (record.operation == kConnection) add_connection(connection, record.data);
+      const std::string_view time = fields_.at("time");
+      if (record.operation == kMessage && time.size() == 8 && known_.count(connection) > 0)
+        chunk.entries.push_back(
+            {number_at(time.data()) * std::uint64_t{1'000'000'000} + number_at(time.data() + 4), connection,
+             record.offset});
+    }
+    index_.chunks.push_back(std::move(chunk));
+  }
+
+  BagIndex index() { return std::move(index_); }
+
+ private:
+  void add_connection(std::uint32_t id, std::string_view data) {
+    Fields described;
+    if (!described.parse(data) || !known_.insert(id).second) return;
+    index_.connections.push_back({id, std::string(fields_.at("topic")), std::string(described.at("type")),
+                                  std::string(described.at("md5sum"))});
+  }
+
+  Fields fields_;
+  std::set<std::uint32_t> known_;
+  BagIndex index_;
+};
+
 }  // namespace
 
 BagIndex read_bag_index(const std::string& path) {
   return IndexReader(path).read();
+}
+
+BagIndex rebuilt_bag_index(const std::string& path) {
+  IndexBuilder builder;
+  walk_bag(path, [&builder](std::uint64_t place, std::string_view records) {
+    builder.add(place, records);
+    return true;
+  });
+  return builder.index();
 }
 
 }  // namespace backlash::ros_bridge

@@ -31,4 +31,7 @@ struct BagIndex {
 /// What it says of the chunks is not held against them, see bag_structure.h.
 BagIndex read_bag_index(const std::string& path);
 
+/// The same of what the chunks themselves hold, up to the first damage. Throws as walk_bag().
+BagIndex rebuilt_bag_index(const std::string& path);
+
 }  // namespace backlash::ros_bridge

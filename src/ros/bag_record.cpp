@@ -86,8 +86,7 @@ class JointRun {
   /// Of a channel map: what this topic has of it.
   record::Record finished(const record::ChannelMap& sources) {
     for (const record::ChannelSource& source : sources.sources) {
-      std::vector<double>& column = record_.column(source.channel);
-      if (column.empty())
+      if (record_.column(source.channel).empty() && !source.optional)
         throw BadData(path_, fmt::format("channels.{}: no message on {} has the {} of '{}'",
                                          record::channel_name(source.channel), printable(topic_),
                                          record::field_name(source.field), printable(source.name)));
@@ -101,6 +100,7 @@ class JointRun {
   record::Record with_warnings() {
     const std::string repeated = stamps_.describe("topic " + topic_);
     if (!repeated.empty()) record_.warnings.push_back(repeated);
+    stamps_.count_into(record_);
     for (std::string& warning : record::describe_time_base(record_.time))
       record_.warnings.push_back(std::move(warning));
     return std::move(record_);

@@ -26,13 +26,12 @@ bool is_type(const BagIndex::Connection& c) {
          c.md5sum == ros::message_traits::MD5Sum<Message>::value();
 }
 
-/// What is wrong with the file as a whole is told before what is wrong with its index.
+/// A bag that was cut off has none, or one that points beyond its end.
 BagIndex index_of(const std::string& path) {
   try {
     return read_bag_index(path);
   } catch (const BadData&) {
-    check_bag_structure(path);
-    throw;
+    return rebuilt_bag_index(path);
   }
 }
 
@@ -40,7 +39,13 @@ class BagSource : public MessageSource {
  public:
   explicit BagSource(const std::string& path) : path_(path), index_(index_of(path)) {}
 
-  void check() override { check_bag_structure(path_); }
+  void check() override {
+    if (const std::string damage = walk_bag(path_); !damage.empty()) throw BadData(path_, damage);
+  }
+
+  std::vector<std::string> warnings() const override {
+    return damage_.empty() ? std::vector<std::string>() : std::vector<std::string>{damage_};
+  }
 
   std::vector<Topic> topics() override {
     std::vector<Topic> all;
@@ -101,14 +106,16 @@ class BagSource : public MessageSource {
       ++count;
       take(from.decoder.message(), *from.topic);
     });
-    check_bag_structure(path_, [&delivery](std::uint64_t place, std::string_view records) {
+    damage_ = walk_bag(path_, [&delivery](std::uint64_t place, std::string_view records) {
       return delivery.add(place, records);
     });
+    delivery.finish();
   }
 
  private:
   const std::string path_;
   const BagIndex index_;
+  std::string damage_;  // that the last read met
 };
 
 }  // namespace

@@ -41,40 +41,58 @@ class Checker {
   }
 
   std::string records_at(std::uint64_t place) {
-    place_ = std::min(place, size_);
+    place_ = record_start_ = std::min(place, size_);
     in_.seekg(static_cast<std::streamoff>(place_));
-    take_record();
-    if (fields_.operation() != kChunk) damaged("a chunk is not where the index says");
-    return std::string(records_of_chunk());
+    try {
+      take_record();
+      if (fields_.operation() != kChunk) damaged("a chunk is not where the index says");
+      return std::string(records_of_chunk());
+    } catch (const Damage& damage) {
+      fail(damage.what);
+    }
   }
 
-  void check() {
+  std::string walk() {
     read_version();
-    while (place_ < size_) {
-      record_starts_.insert(place_);
-      read_record();
+    try {
+      while (place_ < size_) {
+        record_starts_.insert(place_);
+        read_record();
+      }
+      check_places();
+    } catch (const Damage& damage) {
+      return damage.what;
     }
-    if (!seen_header_) fail("there is no bag header");
-    if (index_place_ == 0) fail("not indexed (the recording was cut off): try 'rosbag reindex'");
+    return index_place_ == 0 ? "not indexed, as a recorder leaves it that is killed: read to its end" : "";
+  }
+
+ private:
+  /// Ends a walk.
+  struct Damage {
+    std::string what;
+  };
+
+  [[noreturn]] void fail(const std::string& reason) const { throw BadData(path_, reason); }
+
+  [[noreturn]] void damaged(const std::string& reason) const {
+    throw Damage{fmt::format("damaged bag: {} (byte {} of {}); nothing behind it was read", reason,
+                             record_start_, size_)};
+  }
+
+  void check_places() const {
+    if (!seen_header_) damaged("there is no bag header");
+    if (index_place_ == 0) return;
     if (index_place_ != size_ && record_starts_.count(index_place_) == 0)
       damaged("its index is not where it says");
     for (const std::uint64_t chunk : stated_chunks_)
       if (chunk_starts_.count(chunk) == 0) damaged("a chunk is not where the index says");
   }
 
- private:
-  [[noreturn]] void fail(const std::string& reason) const { throw BadData(path_, reason); }
-
-  [[noreturn]] void damaged(const std::string& reason) const {
-    fail(fmt::format("damaged bag: {} (byte {}); 'rosbag reindex' may save the part before it", reason,
-                     record_start_));
-  }
-
   void take(std::uint64_t count, const char* what, std::string& bytes) {
     if (count > size_ - place_)
       damaged(std::string(what) + " ends after the end of the file, it was cut off");
     bytes.resize(count);
-    if (!in_.read(bytes.data(), static_cast<std::streamsize>(count))) fail("cannot be read further");
+    if (!in_.read(bytes.data(), static_cast<std::streamsize>(count))) damaged("cannot be read further");
     place_ += count;
   }
 
@@ -88,8 +106,9 @@ class Checker {
   void read_version() {
     in_.seekg(0);
     if (size_ == 0) fail("not a bag: the file is empty");
-    std::string start;
-    take(std::min<std::uint64_t>(size_, kVersionLine.size()), "version", start);
+    std::string start(std::min<std::uint64_t>(size_, kVersionLine.size()), '\0');
+    if (!in_.read(start.data(), static_cast<std::streamsize>(start.size()))) fail("cannot be read");
+    place_ = start.size();
     if (start.compare(0, kMagic.size(), kMagic) != 0)
       fail("not a bag: it starts with '" + printable(start) + "'");
     if (start != kVersionLine) fail("a bag of another format than 2.0 ('" + printable(start) + "')");
@@ -111,7 +130,9 @@ class Checker {
     record_start_ = place_;
     take(take_length("a record header"), "a record header", header_);
     if (!fields_.parse(header_)) damaged("a record header does not hold together");
-    take(take_length("a record"), "a record", data_);
+    const std::uint32_t length = take_length("a record");
+    cut_ = length > size_ - place_ && fields_.operation() == kChunk && fields_.at("compression") == "none";
+    take(cut_ ? size_ - place_ : length, "a record", data_);
   }
 
   void read_record() {
@@ -153,10 +174,16 @@ class Checker {
     if (!connection.parse(data_)) damaged("a connection record does not hold together");
   }
 
+  /// Of one that does not hold together the records before the damage are handed on; but the last one may
+  /// have been cut, and what follows be taken for its end.
   void read_chunk() {
-    const std::string_view records = records_of_chunk();
-    walk_chunk(records);
-    if (take_ && !take_(record_start_, records)) damaged("an index points to no message");
+    std::string_view records = records_of_chunk();
+    const std::string problem = walk_chunk(records);
+    if (!problem.empty()) records = records.substr(0, chunk_.records.empty() ? 0 : chunk_.records.back());
+    const bool taken = !take_ || take_(record_start_, records);
+    if (!problem.empty() || cut_)
+      damaged(cut_ ? "a chunk ends after the end of the file, it was cut off" : problem);
+    if (!taken) damaged("an index points to no message");
   }
 
   /// Views of what was read last.
@@ -165,7 +192,7 @@ class Checker {
     if (size > kLargestPart) damaged("a chunk has an impossible length");
     const std::string_view compression = fields_.at("compression");
     if (compression == "none") {
-      if (data_.size() != size) damaged("a chunk has another length than it says");
+      if (data_.size() != size && !cut_) damaged("a chunk has another length than it says");
       return data_;
     }
     if (compression != "lz4" && compression != "bz2") damaged("a chunk has an unknown compression");
@@ -189,7 +216,8 @@ class Checker {
         ->decompress(unpacked_.data(), size, packed, static_cast<unsigned>(data_.size()));
   }
 
-  void walk_chunk(std::string_view bytes) {
+  /// What is wrong in it; empty where nothing is.
+  std::string walk_chunk(std::string_view bytes) {
     chunk_ = Chunk{std::move(chunk_.records)};
     chunk_.records.clear();
     ChunkRecords records(bytes);
@@ -197,15 +225,16 @@ class Checker {
     Step step = records.next(record);
     for (; step == Step::record; step = records.next(record)) {
       if (record.operation != kMessage && record.operation != kConnection)
-        damaged("a chunk holds a record of an unknown kind");
+        return "a chunk holds a record of an unknown kind";
       chunk_.records.push_back(record.offset);
       if (record.operation != kMessage) continue;
       chunk_.last_message = record.offset;
       chunk_.has_message = true;
     }
-    if (step == Step::bad_header) damaged("a record header in a chunk does not hold together");
+    if (step == Step::bad_header) return "a record header in a chunk does not hold together";
     if (step == Step::bad_length)
-      damaged(records.left() < 4 ? "a chunk ends within a record" : "a record reaches beyond its chunk");
+      return records.left() < 4 ? "a chunk ends within a record" : "a record reaches beyond its chunk";
+    return "";
   }
 
   /// An index may point to a connection record in front of its message, never behind the last message.
@@ -223,6 +252,7 @@ class Checker {
   std::ifstream in_;
   std::uint64_t size_ = 0, place_ = 0, record_start_ = 0, index_place_ = 0;
   bool seen_header_ = false;
+  bool cut_ = false;                    // the last record was a chunk that the file does not have to its end
   std::string length_, header_, data_;  // of the last record; their room is used again
   recording::Bytes unpacked_;
   Fields fields_;  // of header_
@@ -234,8 +264,8 @@ class Checker {
 
 }  // namespace
 
-void check_bag_structure(const std::string& path, const TakeChunk& take) {
-  Checker(path, take).check();
+std::string walk_bag(const std::string& path, const TakeChunk& take) {
+  return Checker(path, take).walk();
 }
 
 std::string records_of_bag_chunk(const std::string& path, std::uint64_t place) {

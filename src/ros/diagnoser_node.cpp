@@ -13,6 +13,7 @@
 #include "backlash_diagnosis/ros/curve_job.h"
 #include "backlash_diagnosis/ros/joint_rigs.h"
 #include "backlash_diagnosis/ros/messages.h"
+#include "backlash_diagnosis/ros/node_main.h"
 #include "backlash_diagnosis/ros/parameters.h"
 
 namespace backlash::ros_bridge {
@@ -363,6 +364,14 @@ void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConst
     result.message = error.what();
     curve_server_->setAborted(result, result.message);
   }
+}
+
+int diagnoser_main(int argc, char** argv) {
+  return node_main(argc, argv, "diagnoser", diagnoser_help(), [] {
+    const ros::NodeHandle handle, private_handle("~");
+    DiagnoserNode(handle, private_handle, load_diagnoser_settings(private_handle)).run();
+    return 0;
+  });
 }
 
 }  // namespace backlash::ros_bridge

@@ -12,6 +12,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/ros/bag_record.h"
+#include "backlash_diagnosis/ros/node_main.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -271,6 +272,13 @@ void ExciterNode::execute(const backlash_diagnosis::ExciteGoalConstPtr& goal) {
     server_->setPreempted(result, result.message);
   else
     server_->setAborted(result, result.message);
+}
+
+int exciter_main(int argc, char** argv) {
+  return node_main(argc, argv, "exciter", exciter_help(), [] {
+    const ros::NodeHandle handle, private_handle("~");
+    return ExciterNode(handle, read_exciter_settings(private_handle)).run();
+  });
 }
 
 }  // namespace backlash::ros_bridge

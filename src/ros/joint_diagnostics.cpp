@@ -16,6 +16,9 @@ using DiagnosticStatus = diagnostic_msgs::DiagnosticStatus;
 constexpr double kSecondsPerYear = 365.25 * 86400;
 constexpr double kAnotherTime = 3600;  // s: stamps so old or new are of a recording, not late
 
+// s: choice. Each look at 10 s of 1 kHz takes 8 ms of a core: 1.3 % for 16 joints.
+constexpr double kLookedAt = 10, kBetweenLooks = 10;
+
 unsigned char level_of(diagnosis::Grade grade) {
   switch (grade) {
     case diagnosis::Grade::good:
@@ -79,6 +82,7 @@ void JointDiagnostics::set(const DiagnosticsSettings& settings) {
 bool JointDiagnostics::update() {
   const MonitorState state = monitor_.state();
   const std::lock_guard<std::mutex> lock(mutex_);
+  look_at_recording();
   bool changed = false;
   for (Concern& concern : concerns_) {
     Status status;
@@ -93,6 +97,13 @@ bool JointDiagnostics::update() {
     concern.status = std::move(status);
   }
   return changed;
+}
+
+void JointDiagnostics::look_at_recording() {
+  const double time = ros::SteadyTime::now().toSec();
+  if (time < next_look_) return;
+  next_look_ = time + kBetweenLooks;
+  found_ = monitor_.check_recording(kLookedAt).findings;
 }
 
 void JointDiagnostics::describe_backlash(const MonitorState& state, Status& status) {
@@ -218,6 +229,13 @@ void JointDiagnostics::describe_signal(const MonitorState& state, Status& status
     status.summary(DiagnosticStatus::WARN, "periods have gaps or no sample inside the classes");
   else
     status.summary(DiagnosticStatus::OK, state.latest ? "sound" : "waiting for samples");
+  for (const record::Finding& finding : found_) {
+    status.add(record::id_of(finding.kind), finding.message);
+    if (finding.consequence != record::Consequence::noted)
+      status.mergeSummary(finding.consequence == record::Consequence::refused ? DiagnosticStatus::ERROR
+                                                                              : DiagnosticStatus::WARN,
+                          finding.message);
+  }
   status.add("Samples with NaN", state.counters.not_a_number);
   if (!state.latest || !state.latest->apd) return;
   const diagnosis::ApdResult& apd = *state.latest->apd;

@@ -7,6 +7,7 @@
 #include <chrono>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "backlash_diagnosis/ros/curve_job.h"
 
 namespace backlash::ros_bridge {
@@ -262,6 +263,16 @@ std::optional<diagnosis::Baseline> JointMonitor::baseline() const {
 std::shared_ptr<const diagnosis::MonitoringCurve> JointMonitor::curve() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return curve_;
+}
+
+record::RecordCheck JointMonitor::check_recording(double seconds) const {
+  record::Record latest;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const record::Record& kept = stream_.kept();
+    if (!kept.time.empty()) latest = kept.slice(kept.time.back() - seconds, HUGE_VAL);
+  }
+  return record::check_record(std::move(latest), rig_file::declared_motion(settings_.rig.rig)).check;
 }
 
 MonitorState JointMonitor::state() const {

@@ -50,6 +50,7 @@ record::ChannelMap robot_channels(const std::string& joint, record::Channel effo
     source.channel = channel;
     source.name = joint;
     source.field = field;
+    source.optional = channel == record::Channel::motor_velocity;  // the positions have it as well
     map.sources.push_back(source);
   }
   return map;

@@ -37,8 +37,8 @@ class Ros2Source : public MessageSource {
     }
     std::optional<std::string> text;
     if (there)
-      recording_->read({kInfoTopic}, [&](const std::string&, const std::uint8_t* data, std::size_t size) {
-        if (!text) text = recording::read_cdr_text(data, size, path_ + ": " + kInfoTopic);
+      recording_->read({kInfoTopic}, [&](const recording::Message& m) {
+        if (!text) text = recording::read_cdr_text(m.data, m.size, path_ + ": " + kInfoTopic);
       });
     return text;
   }
@@ -47,9 +47,9 @@ class Ros2Source : public MessageSource {
     std::map<std::string, std::size_t> counts;
     recording::JointState read;
     sensor_msgs::JointState message;
-    recording_->read(topics, [&](const std::string& topic, const std::uint8_t* data, std::size_t size) {
-      const auto source = fmt::format("{}: {} message {}", path_, printable(topic), counts[topic]++);
-      recording::read_cdr(data, size, source, read);
+    recording_->read(topics, [&](const recording::Message& m) {
+      const auto source = fmt::format("{}: {} message {}", path_, printable(m.topic), counts[m.topic]++);
+      recording::read_cdr(m.data, m.size, source, read);
       if (read.seconds < 0)
         throw BadData(source, fmt::format("header.stamp = {} s: must not be before 1970", read.seconds));
       message.header.stamp = ros::Time(static_cast<std::uint32_t>(read.seconds), read.nanoseconds);
@@ -57,7 +57,7 @@ class Ros2Source : public MessageSource {
       message.position.swap(read.position);
       message.velocity.swap(read.velocity);
       message.effort.swap(read.effort);
-      take(message, topic);
+      take(message, m.topic);
     });
   }
 

@@ -10,7 +10,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/ros/simulated_arm.h"
+#include "backlash_diagnosis/ros/node_main.h"
 #include "backlash_diagnosis/ros/simulated_joint.h"
 
 namespace backlash::ros_bridge {
@@ -75,8 +75,7 @@ SimulatorNode::SimulatorNode(const ros::NodeHandle& handle, const ros::NodeHandl
 }
 
 void SimulatorNode::advertise() {
-  if (settings_.arm)
-    machines_.push_back(std::make_unique<SimulatedArm>(*settings_.arm, handle_, private_handle_));
+  if (settings_.arm) machines_.push_back(settings_.arm->make(handle_, private_handle_));
   for (const JointSettings& joint : settings_.joints) {
     const std::string scope = settings_.named_joints ? joint.file.rig.joint : "";
     machines_.push_back(std::make_unique<SimulatedJoint>(joint, ros::NodeHandle(handle_, scope),
@@ -255,6 +254,11 @@ bool SimulatorNode::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Respon
   }
   ROS_INFO_STREAM("reset: " << response.message);
   return true;
+}
+
+int simulator_main(int argc, char** argv) {
+  return node_main(argc, argv, "simulator", simulator_help(),
+                   [] { return SimulatorNode(ros::NodeHandle(), ros::NodeHandle("~")).run(); });
 }
 
 }  // namespace backlash::ros_bridge

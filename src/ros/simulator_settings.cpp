@@ -10,8 +10,8 @@
 #include <set>
 #include <utility>
 
-#include "arm_settings.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/loaded_function.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/ros/parameters.h"
 #include "backlash_diagnosis/ros/rig_folder.h"
@@ -190,7 +190,7 @@ void read_rigs_of_joints(Parameters& parameters, SimulatorSettings& settings) {
 bool is_arm(Parameters& parameters) {
   if (!parameters.has("rig")) return false;
   const std::string path = parameters.text("rig", "");
-  return of_parameter("rig", [&path] { return arm::is_arm_rig(path); });
+  return of_parameter("rig", [&path] { return rig_file::is_arm_rig(path); });
 }
 
 }  // namespace
@@ -206,10 +206,10 @@ SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle)
   SimulatorSettings settings;
   const double timeout = parameters.number("torque_timeout", 0, Range::between(0, kLongestHold));
   if (is_arm(parameters)) {
-    settings.arm = read_arm_settings(parameters);
-    settings.arm->torque_timeout = timeout;
-    settings.rig = settings.arm->arm.rig.name;
-    settings.sampling_rate = settings.arm->arm.sensors.sampling_rate;
+    loaded_function<decltype(backlash_read_arm)>("backlash_diagnosis_ros_arm", "backlash_read_arm")(
+        parameters, timeout, settings.arm.emplace());
+    settings.rig = settings.arm->rig;
+    settings.sampling_rate = settings.arm->sampling_rate;
   } else {
     read_rigs_of_joints(parameters, settings);
     for (JointSettings& joint : settings.joints) joint.torque_timeout = timeout;

@@ -22,7 +22,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const std::string kStandardOutput = "-";
 constexpr double kDay = 86400;
 
 Command command() {

@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/identification/model_comparison.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "report/json.h"
 #include "tools/common/command_line.h"
@@ -18,6 +19,7 @@
 #include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
+#include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
@@ -170,7 +172,9 @@ int compare(const Arguments& arguments) {
     files.push_back(rig_file::load_rig_file(arguments.positional(i)));
     rigs.push_back(files.back().rig);
   }
-  record::Record given = read_record(path, place_of(files.front()));
+  RecordDoor door("compare_models");
+  record::Record given =
+      door.admit(read_record(path, place_of(files.front())), rig_file::declared_motion(rigs.front()), path);
   given.name = path;
   identification::ComparedRecord record;
   std::vector<identification::ModelComparison> models;
@@ -187,7 +191,7 @@ int compare(const Arguments& arguments) {
   Json json = {{"schema_version", 1}, {"version", version()}};
   json.update(to_json(record, path));
   for (std::size_t i = 0; i < models.size(); ++i) json["models"].push_back(to_json(models[i], files[i]));
-  write_text(out, json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+  write_text(out, door.with_findings(json.dump(-1, ' ', false, Json::error_handler_t::replace)));
   tell(files, models, record.engagements.size());
   std::cout.flush();
   if (arguments.has("plot")) plot_model_comparison(out, arguments.text("plot"));

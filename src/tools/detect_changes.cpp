@@ -2,6 +2,7 @@
 // Says whether a joint has changed since it was commissioned, by which effect and since when.
 #include <malloc.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 
@@ -11,11 +12,13 @@
 #include "backlash_diagnosis/changes/arm_changes.h"
 #include "backlash_diagnosis/changes/change_report.h"
 #include "backlash_diagnosis/changes/changes_of_rig.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
-#include "tools/common/arm_command.h"
+#include "tools/arm/arm_record.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/progress_bar.h"
+#include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
@@ -62,40 +65,74 @@ Command command() {
   return c;
 }
 
-record::Record read(const std::string& path, const rig_file::RigFile& rig,
-                    std::vector<std::string>& warnings) {
+record::Record read(const std::string& path, const rig_file::RigFile& rig) {
   record::Record record = read_record(path, place_of(rig));
   record.name = std::filesystem::path(path).filename();
-  for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
   return record;
 }
 
+/// A position that jumps needs no model to be seen: its zero moved, whatever else has changed.
+changes::Change slip_of(const record::Jump& jump, const std::string& joint) {
+  changes::Change change;
+  change.effect = "encoder_slip";
+  change.joint = joint;
+  change.since = jump.after;
+  change.since_from = jump.before;
+  change.since_to = jump.after;
+  change.size = {{"offset", "rad", jump.size}};
+  change.gain = change.error_before = change.error_after = kNaN;
+  return change;
+}
+
+void add_slips(changes::Changes& found, const std::vector<RecordDoor::JointJump>& jumps) {
+  for (const RecordDoor::JointJump& jump : jumps) found.changes.push_back(slip_of(jump.jump, jump.joint));
+  std::stable_sort(found.changes.begin(), found.changes.end(),
+                   [](const changes::Change& a, const changes::Change& b) { return a.since < b.since; });
+}
+
 changes::Changes changes_of_joint(changes::ChangeInputs& inputs, const changes::ChangeSettings& settings,
-                                  const Progress& progress) {
+                                  const Progress& progress, RecordDoor& door) {
   const rig_file::RigFile rig = rig_file::load_rig_file(inputs.rig);
   inputs.joint = rig.rig.joint;
+  const record::DeclaredMotion declared = rig_file::declared_motion(rig.rig);
   std::vector<std::string> warnings;
   std::vector<record::Record> healthy;
-  for (const std::string& file : inputs.healthy) healthy.push_back(read(file, rig, warnings));
-  const record::Record record = read(inputs.record, rig, warnings);
-  changes::Changes found = changes::detect_changes(rig, healthy, record, settings, progress);
+  for (const std::string& file : inputs.healthy)
+    for (record::Record& stretch : door.admit_stretches(read(file, rig), declared, file))
+      healthy.push_back(std::move(stretch));
+  std::vector<RecordDoor::JointJump> jumps;
+  const record::Record record =
+      door.admit_with_jumps(read(inputs.record, rig), declared, inputs.record, jumps);
+  for (const record::Record& each : healthy)
+    for (const std::string& warning : each.warnings) warnings.push_back(each.name + ": " + warning);
+  for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
+  changes::Changes found;
+  try {
+    found = changes::detect_changes(rig, healthy, record, settings, progress);
+  } catch (const CannotIdentify& error) {
+    if (jumps.empty()) throw;
+    found.cannot_tell = error.what();
+  }
+  add_slips(found, jumps);
   found.warnings.insert(found.warnings.begin(), warnings.begin(), warnings.end());
   return found;
 }
 
 changes::Changes changes_of_arm(const changes::ChangeInputs& inputs, const changes::ChangeSettings& settings,
-                                const Progress& progress) {
+                                const Progress& progress, RecordDoor& door) {
   const arm::ArmRig rig = arm::load_arm_rig(inputs.rig);
   std::vector<std::string> warnings;
-  const auto read = [&](const std::string& path) {
-    arm::ArmRecord record = read_arm_record(path, rig);
-    for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
-    return record;
-  };
   std::vector<arm::ArmRecord> healthy;
-  for (const std::string& file : inputs.healthy) healthy.push_back(read(file));
-  const arm::ArmRecord record = read(inputs.record);
+  for (const std::string& file : inputs.healthy) healthy.push_back(admitted_arm_record(file, rig, door));
+  std::vector<RecordDoor::JointJump> jumps;
+  const arm::ArmRecord record =
+      arm::arm_record(door.admit_with_jumps(read_joints(inputs.record, rig), inputs.record, jumps), rig,
+                      std::filesystem::path(inputs.record).filename());
+  for (const arm::ArmRecord& each : healthy)
+    for (const std::string& warning : each.warnings) warnings.push_back(each.name + ": " + warning);
+  for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
   changes::Changes found = changes::detect_changes(rig, healthy, record, settings, progress);
+  add_slips(found, jumps);
   found.warnings.insert(found.warnings.begin(), warnings.begin(), warnings.end());
   return found;
 }
@@ -113,15 +150,16 @@ int detect(const Arguments& arguments) {
   changes::ChangeSettings settings;
   settings.false_alarms_per_hour = inputs.false_alarms_per_hour;
   changes::Changes found;
+  RecordDoor door("detect_changes");
   try {
     ProgressBar bar;
-    found = arm::is_arm_rig(inputs.rig) ? changes_of_arm(inputs, settings, bar.progress())
-                                        : changes_of_joint(inputs, settings, bar.progress());
+    found = rig_file::is_arm_rig(inputs.rig) ? changes_of_arm(inputs, settings, bar.progress(), door)
+                                             : changes_of_joint(inputs, settings, bar.progress(), door);
   } catch (const CannotIdentify& error) {
     found.cannot_tell = error.what();
     found.noise = kNaN;  // nothing was learned
   }
-  write_text(arguments.text("json"), changes::change_json(found, inputs));
+  write_text(arguments.text("json"), door.with_findings(changes::change_json(found, inputs)));
   std::cout << changes::change_summary(found);
   if (!found.changes.empty()) return kFault;
   if (found.cannot_tell.empty()) return kHealthy;

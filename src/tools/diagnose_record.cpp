@@ -9,27 +9,27 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/baseline.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
-#include "backlash_diagnosis/findings/arm_play_report.h"
 #include "backlash_diagnosis/report/diagnosis_page.h"
 #include "backlash_diagnosis/report/diagnosis_report.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
-#include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/for_arm.h"
 #include "tools/common/of_file.h"
 #include "tools/common/progress_bar.h"
+#include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
 namespace {
 
-const std::string kStandardOutput = "-";
-
 /// What each method looks at, for the help text.
 std::string needs_of_methods() {
   std::string text = "Methods and the channels that they need:";
   for (const diagnosis::DiagnosisMethod& method : diagnosis::diagnosis_method_table())
-    text += (text.back() == ':' ? " " : "; ") + method.name + " - " + method.needs;
+    text += (text.back() == ':' ? " " : "; ") + method.name + " - " + needs_of(method);
   return text + ".";
 }
 
@@ -75,22 +75,6 @@ Command command() {
       "  2   fault found: service or stop\n"
       "  3   inconclusive: the estimates cannot tell, or not well enough for --save-baseline\n";
   return c;
-}
-
-int exit_code(diagnosis::Grade grade) {
-  switch (grade) {
-    case diagnosis::Grade::good:
-    case diagnosis::Grade::ungraded:
-      return kHealthy;
-    case diagnosis::Grade::watch:
-      return kWatch;
-    case diagnosis::Grade::service:
-    case diagnosis::Grade::stop:
-      return kFault;
-    case diagnosis::Grade::cannot_tell:
-      break;
-  }
-  return kInconclusive;
 }
 
 /// What the command was given, read.
@@ -170,7 +154,7 @@ void read_machine_files(Inputs& in, const Arguments& arguments) {
   }
 }
 
-Inputs read_inputs(const Arguments& arguments) {
+Inputs read_inputs(const Arguments& arguments, RecordDoor& door) {
   Inputs in;
   in.method = arguments.text("method");
   const auto& methods = diagnosis::diagnosis_methods();
@@ -199,7 +183,9 @@ Inputs read_inputs(const Arguments& arguments) {
       in.warnings.push_back(warning);
   }
   read_machine_files(in, arguments);
-  in.record = read_record(arguments.positional(0), place);
+  in.record = door.admit(read_record(arguments.positional(0), place),
+                         in.rig ? rig_file::declared_motion(in.rig->rig) : record::DeclaredMotion{},
+                         arguments.positional(0));
   if (arguments.has("periods")) keep_last_periods(in, periods);
   return in;
 }
@@ -262,44 +248,11 @@ bool save_baseline(const diagnosis::Diagnosis& diagnosis, const Inputs& in, cons
   return true;
 }
 
-/// The rig file of an arm: all its joints in one run. The exit code is that of the worst.
-int diagnose_arm(const Arguments& arguments) {
-  for (const char* option :
-       {"report", "curve", "limits", "baseline", "save-baseline", "method", "joint", "topic", "periods"})
-    if (arguments.has(option))
-      throw UsageError(std::string("--") + option +
-                       " is for a record of one joint; this is the rig file of an arm");
-  const std::string out = arguments.text("json"), rig = arguments.text("rig");
-  if (out != kStandardOutput) check_output(out, {arguments.positional(0), rig});
-  const geared_arm::GearedArm arm = geared_arm::load_geared_arm(rig);
-  const arm::ArmRecord record = read_arm_record(arguments.positional(0), arm.rig);
-  const findings::ArmPlayReport report = findings::arm_play_report(arm, record);
-  const std::string json = findings::arm_play_json(report);
-  if (out == kStandardOutput) {
-    std::cout << json;
-  } else {
-    write_text(out, json);
-    findings::print_arm_plays(report, std::cout);
-  }
-  // A fault that was found counts more than a joint that cannot be told.
-  bool unknown = false;
-  int worst = kHealthy;
-  for (std::size_t j = 0; j < report.verdicts.size(); ++j) {
-    // At most so much, without limits, is an answer.
-    const bool small =
-        report.plays[j].estimate.status == diagnosis::Status::below_range && !arm.joints[j].limits;
-    const int code = small ? kHealthy : exit_code(report.verdicts[j].grade);
-    if (code == kInconclusive)
-      unknown = true;
-    else
-      worst = std::max(worst, code);
-  }
-  return worst == kHealthy && unknown ? kInconclusive : worst;
-}
-
 int diagnose_record(const Arguments& arguments) {
-  if (arguments.has("rig") && arm::is_arm_rig(arguments.text("rig"))) return diagnose_arm(arguments);
-  Inputs in = read_inputs(arguments);
+  RecordDoor door("diagnose_record");
+  if (arguments.has("rig") && rig_file::is_arm_rig(arguments.text("rig")))
+    return run_for_arm(arguments, door);
+  Inputs in = read_inputs(arguments, door);
   check_outputs(arguments);
   const std::string out = arguments.text("json");
   if (in.rig && !in.curve) build_own_curve(in);
@@ -322,7 +275,7 @@ int diagnose_record(const Arguments& arguments) {
           ? diagnosis::diagnose(*in.last_periods, in.settings, report.curve, in.baseline, in.method)
           : diagnosis::diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
   explain(report.diagnosis, in);
-  const std::string json = report::diagnosis_json(report);
+  const std::string json = door.with_findings(report::diagnosis_json(report));
   if (out == kStandardOutput) {
     std::cout << json;
   } else {

@@ -22,7 +22,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const std::string kStandardOutput = "-";
 constexpr double kDegree = M_PI / 180;
 constexpr int kCyclePoints = 400;  // per mesh cycle
 

@@ -8,12 +8,15 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/findings/identification_report.h"
 #include "backlash_diagnosis/identification/fitted_rig.h"
-#include "tools/common/arm_command.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
+#include "backlash_diagnosis/rig_file/rig_document.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/for_arm.h"
 #include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
+#include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
@@ -55,9 +58,10 @@ Command command() {
                 "--plot fit.png"};
   c.exit_codes =
       "  0   done\n"
-      "  3   the records allow no procedure, or contradict each other (then the values hold none of them "
-      "well, "
-      "and their errors hold all); OUT.json has the reason\n";
+      "  3   the records allow no procedure, contradict each other (then the values hold none of them well, "
+      "and their errors hold all), or are of a machine of another kind: half of what a channel does, and "
+      "more, is left (then errors are null and FITTED.yaml keeps what was declared); OUT.json has the "
+      "reason\n";
   return c;
 }
 
@@ -73,12 +77,17 @@ void check_outputs(const Arguments& arguments) {
   check_output(plot, inputs);
 }
 
-int identify_joint(const Arguments& arguments) {
+int identify_joint(const Arguments& arguments, RecordDoor& door) {
   const rig_file::RigFile file = rig_file::load_rig_file(arguments.text("rig"));
+  if (!file.diagnosis.waveform) rig_file::RigDocument(file).check_changes(file.rig);  // before the work
+  record::DeclaredMotion declared = rig_file::declared_motion(file.rig);
+  declared.may_hold_load = arguments.positionals().size() > 1;
   std::vector<record::Record> records;
   for (const std::string& path : arguments.positionals()) {
-    records.push_back(read_record(path, place_of(file)));
-    records.back().name = std::filesystem::path(path).filename();
+    record::Record record = read_record(path, place_of(file));
+    record.name = std::filesystem::path(path).filename();
+    for (record::Record& stretch : door.admit_stretches(std::move(record), declared, path))
+      records.push_back(std::move(stretch));
   }
   identification::Identification found = of_file(file.source, [&] {
     ProgressBar bar;  // gone before anything is printed
@@ -88,27 +97,28 @@ int identify_joint(const Arguments& arguments) {
   for (const record::Record& record : records)
     for (const std::string& warning : record.warnings) found.warnings.push_back(record.name + ": " + warning);
   write_text(arguments.text("out"), identification::fitted_rig_text(file, found));
-  write_text(arguments.text("json"),
-             findings::identification_json(found, arguments.text("rig"), arguments.positionals()));
+  write_text(arguments.text("json"), door.with_findings(findings::identification_json(
+                                         found, arguments.text("rig"), arguments.positionals())));
   findings::print_summary(found, std::cout);
   std::cout.flush();
   if (arguments.has("plot")) plot_identification(arguments.text("json"), arguments.text("plot"));
-  return found.several ? kInconclusive : kHealthy;
+  return found.several || found.unexplained ? kInconclusive : kHealthy;
 }
 
 int identify_machine(const Arguments& arguments) {
   for (const std::string& path : arguments.positionals()) check_record_path(path);
   check_outputs(arguments);
-  const bool is_arm = arm::is_arm_rig(arguments.text("rig"));
+  const bool is_arm = rig_file::is_arm_rig(arguments.text("rig"));
   if (is_arm && arguments.has("plot")) throw UsageError("--plot: there is no plot for an arm");
+  RecordDoor door("identify");
   try {
-    return is_arm ? identify_arm(arguments) : identify_joint(arguments);
+    return is_arm ? run_for_arm(arguments, door) : identify_joint(arguments, door);
   } catch (const CannotIdentify& error) {
     std::cerr << "identify: " << error.what() << '\n';
     identification::Identification nothing;
     nothing.warnings.emplace_back(error.what());
-    write_text(arguments.text("json"),
-               findings::identification_json(nothing, arguments.text("rig"), arguments.positionals()));
+    write_text(arguments.text("json"), door.with_findings(findings::identification_json(
+                                           nothing, arguments.text("rig"), arguments.positionals())));
     return kInconclusive;
   }
 }

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/arm_findings/motion_plan_report.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/findings/motion_plan_report.h"
 #include "backlash_diagnosis/geared_arm/motion_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -102,7 +102,7 @@ arm::HeldJoints held_of(const Arguments& arguments) {
 
 geared_arm::GearedArm arm_of(const Arguments& arguments) {
   const std::string& path = arguments.positional(0);
-  if (arm::is_urdf(path)) {
+  if (rig_file::is_urdf(path)) {
     const arm::ArmRig rig = arm::arm_rig_of_urdf(path, held_of(arguments));
     check_outputs(arguments, {path});
     if (arguments.has("write-rig")) write_text(arguments.text("write-rig"), rig.text);
@@ -111,7 +111,7 @@ geared_arm::GearedArm arm_of(const Arguments& arguments) {
   for (const char* option : {"write-rig", "hold"})
     if (arguments.has(option))
       throw UsageError(std::string("--") + option + " is for a URDF; " + path + " is a rig file");
-  if (!arm::is_arm_rig(path))
+  if (!rig_file::is_arm_rig(path))
     throw BadData(
         path,
         "is the rig of one joint; a motion is planned for an arm (a rig file with urdf). A joint alone "
@@ -136,9 +136,9 @@ int plan(const Arguments& arguments) {
     plan = of_file(path, [&] { return geared_arm::plan_motion(arm, limits, settings, bar.progress()); });
   }
   write_text(arguments.text("out"), geared_arm::motion_text(plan));
-  if (arguments.has("json")) write_text(arguments.text("json"), findings::motion_plan_json(plan));
+  if (arguments.has("json")) write_text(arguments.text("json"), arm_findings::motion_plan_json(plan));
   if (arguments.has("csv")) write_text(arguments.text("csv"), geared_arm::trajectory_csv(arm, plan, rate));
-  findings::print_motion_plan(plan, std::cout);
+  arm_findings::print_motion_plan(plan, std::cout);
   return plan.none_hidden() ? kHealthy : kInconclusive;
 }
 

@@ -7,12 +7,14 @@
 #include "backlash_diagnosis/findings/trace_folder.h"
 #include "backlash_diagnosis/identification/effects/traced_rig.h"
 #include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "backlash_diagnosis/ros/bag_record.h"
-#include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/feedback.h"
+#include "tools/common/for_arm.h"
 #include "tools/common/progress_bar.h"
+#include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
@@ -40,9 +42,10 @@ Command command() {
   c.notes =
       "Two inertias with a mesh between them need motor_torque, motor_position and load_position; one "
       "inertia "
-      "(mesh: rigid) and a locked link need motor_torque and motor_position. All records must be sampled at "
-      "the "
-      "same rate. DIR/rig.yaml can be simulated at once. All parameters are those of the load side of the "
+      "(mesh: rigid) and a locked link need motor_torque and motor_position. Records of "
+      "a "
+      "higher rate are brought to that of the slowest. DIR/rig.yaml can be simulated at once. All parameters "
+      "are those of the load side of the "
       "reduction. Of an arm (a rig file with urdf, records with columns JOINT/channel) payload, direction of "
       "gravity, friction of a joint and pushes are traced; the test record may be of a machine that has "
       "changed: then effects are fitted to its first half and judged on its second.";
@@ -85,22 +88,26 @@ TraceJob job_of(const Arguments& arguments) {
   return job;
 }
 
-record::Record read(const std::string& path, const rig_file::RigFile& rig,
-                    std::vector<std::string>& warnings) {
+record::Record read(const std::string& path, const rig_file::RigFile& rig) {
   record::Record record = read_record(path, place_of(rig));
   record.name = std::filesystem::path(path).filename();
-  for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
   return record;
 }
 
 /// With the readers' warnings. Throws MissingInput, BadData, CannotWrite, CannotIdentify (records that do not
 /// serve), Cancelled; nothing is written then.
-identification::Trace run_trace(const TraceJob& job, const Progress& progress) {
+identification::Trace run_trace(const TraceJob& job, RecordDoor& door, const Progress& progress) {
   identification::check_traced_rig_text(job.rig);
   std::vector<std::string> inputs = job.train, warnings;
   std::vector<record::Record> train;
-  for (const std::string& path : job.train) train.push_back(read(path, job.rig, warnings));
-  const record::Record test = read(job.test, job.rig, warnings);
+  const record::DeclaredMotion declared = rig_file::declared_motion(job.rig.rig);
+  for (const std::string& path : job.train)
+    for (record::Record& stretch : door.admit_stretches(read(path, job.rig), declared, path))
+      train.push_back(std::move(stretch));
+  const record::Record test = door.admit(read(job.test, job.rig), declared, job.test);
+  for (const record::Record& record : train)
+    for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
+  for (const std::string& warning : test.warnings) warnings.push_back(test.name + ": " + warning);
   inputs.push_back(job.test);
   inputs.push_back(job.rig.source);
   const findings::TraceFolder folder(job.folder, inputs);
@@ -110,14 +117,15 @@ identification::Trace run_trace(const TraceJob& job, const Progress& progress) {
   if (job.rig.drive)
     for (const std::string& note : findings::drive_notes(trace, *job.rig.drive)) trace.notes.push_back(note);
   if (progress && !progress(1, "writing the report")) throw Cancelled();
-  folder.write(trace, job.rig, {job.rig.source, job.train, job.test});
+  folder.write(trace, job.rig, {job.rig.source, job.train, job.test}, door.files());
   return trace;
 }
 
 int trace(const Arguments& arguments) {
-  if (arm::is_arm_rig(arguments.text("rig"))) {
+  RecordDoor door("trace_residual");
+  if (rig_file::is_arm_rig(arguments.text("rig"))) {
     if (arguments.has("cutoff")) throw UsageError("--cutoff: the rig file of an arm says it (torque_cutoff)");
-    return trace_arm_residual(arguments);
+    return run_for_arm(arguments, door);
   }
   TraceJob job = job_of(arguments);
   identification::Trace done;
@@ -125,10 +133,10 @@ int trace(const Arguments& arguments) {
     if (arguments.has("feedback")) {
       FeedbackLines lines;
       job.settings.best_so_far = lines.best_so_far();
-      done = run_trace(job, lines.progress());
+      done = run_trace(job, door, lines.progress());
     } else {
       ProgressBar bar;
-      done = run_trace(job, bar.progress());
+      done = run_trace(job, door, bar.progress());
     }
   } catch (const CannotIdentify& error) {
     std::cerr << "trace_residual: " << error.what() << '\n';

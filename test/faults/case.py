@@ -89,9 +89,12 @@ def judged_refusal(case, code, err):
 
 
 def named_place(name, message):
-    """A line, a key with its value, or that the file as a whole is too short, too large or of something else."""
+    """A line, a channel, a key with its value, or that the file as a whole is too short, too large or of something else."""
     whole = r"(no data|larger than|is of the rig|channels|no sample|needs|need|has|samples|record|cannot be simulated)"
     if re.search(re.escape(name) + r".*: .+ = \S+: ", message):
+        return True
+    channel = r": (time|acceleration|(motor|load|sensor|output|reference)_\w+)"
+    if re.search(re.escape(name) + channel, message):
         return True
     return re.search(re.escape(name) + r":\d+", message) or re.search(re.escape(name) + r".*" + whole, message)
 

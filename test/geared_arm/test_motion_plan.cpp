@@ -128,6 +128,9 @@ TEST(MotionPlan, IsTheSameForASeed) {
   EXPECT_NE(motion_text(planned(arm, settings)), once);
 }
 
+/// Eigen::BDCSVD takes four times as long to compile.
+using Singular = Eigen::JacobiSVD<Eigen::MatrixXd>;
+
 /// Y by its definition: the torque of each unit parameter.
 Eigen::MatrixXd defined_regressor(const GearedArm& arm, const arm::Joints& q, const arm::Joints& v,
                                   const arm::Joints& a) {
@@ -164,7 +167,7 @@ TEST(MotionPlan, InformationIsThatOfTheSingularValues) {
       for (Eigen::Index j = 0; j < n; ++j) all.row(i * n + j) /= noise[std::size_t(j)];
     }
     const Eigen::VectorXd size = all.colwise().norm().transpose().cwiseMax(1e-6);
-    Eigen::BDCSVD<Eigen::MatrixXd> rank(all * size.cwiseInverse().asDiagonal());
+    Singular rank(all * size.cwiseInverse().asDiagonal());
     rank.setThreshold(
         1e-6);  // between 0.1, the least that these motions tell, and rounding of empty columns, 1e-8
     EXPECT_EQ(Eigen::Index(information.parameters()), rank.rank()) << name;
@@ -182,8 +185,7 @@ TEST(MotionPlan, InformationIsThatOfTheSingularValues) {
       for (Eigen::Index j = 0; j < n; ++j)
         base(i * n + j, base.cols() - n + j) = rate(i, j) / noise[std::size_t(j)];
     const Eigen::VectorXd length = base.colwise().norm().transpose();
-    const Eigen::VectorXd s =
-        Eigen::BDCSVD<Eigen::MatrixXd>(base * length.cwiseInverse().asDiagonal()).singularValues();
+    const Eigen::VectorXd s = Singular(base * length.cwiseInverse().asDiagonal()).singularValues();
     const MotionInformation found = information.of(motion, rate, 1);
     EXPECT_NEAR(found.condition, s[0] / s[s.size() - 1], 1e-6 * found.condition) << name;
     // Scales of the columns are the same for any two motions: half of the noise tells more by log 2 per
@@ -195,7 +197,7 @@ TEST(MotionPlan, InformationIsThatOfTheSingularValues) {
     Eigen::MatrixXd even(base.rows() / 2, base.cols());
     for (Eigen::Index i = 0; i < rows / 2; ++i) even.middleRows(i * n, n) = base.middleRows(2 * i * n, n);
     const auto volume = [](const Eigen::MatrixXd& y) {
-      return Eigen::BDCSVD<Eigen::MatrixXd>(y).singularValues().array().log().sum();
+      return Singular(y).singularValues().array().log().sum();
     };
     for (double& each : noise) each *= 2;
     EXPECT_NEAR(found.log_volume - information.of(motion, rate, 2).log_volume, volume(base) - volume(even),

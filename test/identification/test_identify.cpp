@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/fitted_rig.h"
 #include "backlash_diagnosis/identification/identify.h"
 #include "support/servo.h"
 
@@ -103,6 +104,43 @@ TEST(Identify, HolesAndGapsAreNamed) {
     ASSERT_FALSE(found.warnings.empty());
     EXPECT_EQ(found.warnings.front().rfind("not used: square.csv", 0), 0u) << found.warnings.front();
   }
+}
+
+/// One sample of a hundred is lost, and twenty in a row.
+record::Record with_losses(const record::Record& all) {
+  std::vector<double> times;
+  for (std::size_t k = 0; k < all.size(); ++k)
+    if (k % 100 != 37 && (k < 3000 || k >= 3020)) times.push_back(all.time[k]);
+  return record::samples_at(all, times);
+}
+
+// A lost sample costs a sample: the machine is the same, and lacks nothing.
+TEST(Identify, LostSamplesAreNoMissingEffect) {
+  const record::Record whole = square_wave(6);
+  const Identification all = identify(test::servo_file().rig, {whole}),
+                       some = identify(test::servo_file().rig, {with_losses(whole)});
+  EXPECT_EQ(some.warnings, all.warnings);
+  for (const auto& [name, value] : all.parameters) {
+    const signal::Measured& with = some.parameters.at(name);
+    EXPECT_NEAR(with.value, value.value, 2 * std::hypot(value.standard_error, with.standard_error)) << name;
+    EXPECT_LT(with.standard_error, 1.5 * value.standard_error + 1e-12) << name;  // a fifth of the rows less
+  }
+}
+
+// Gravity that the file does not declare is most of the torque: no value of such a fit is one of the
+// machine's.
+TEST(Identify, AMachineOfAnotherKindHasNoValues) {
+  const rig_file::RigFile file = test::servo_file();
+  record::Record record = simulation::simulate_record(file.rig, test::servo_run(1), 10);
+  record.name = "pushed.csv";
+  std::vector<double>& torque = record.column(record::Channel::motor_torque);
+  for (std::size_t k = 0; k < record.size(); ++k) torque[k] += 2000 * std::sin(0.6 * M_PI * record.time[k]);
+  const Identification found = identify(file.rig, {record});
+  ASSERT_TRUE(found.unexplained) << found.channels.at("torque").error;
+  EXPECT_GT(found.channels.at("torque").error, 0.5);
+  for (const auto& [name, value] : found.parameters) EXPECT_TRUE(std::isinf(value.standard_error)) << name;
+  const std::string text = fitted_rig_text(file, found);
+  EXPECT_EQ(text, file.text);  // what was declared stays
 }
 
 TEST(Identify, CancelsAndRefusesOtherMachines) {

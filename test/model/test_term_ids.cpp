@@ -22,7 +22,7 @@ const std::set<std::pair<std::string, std::string>> kOtherMeanings = {
     {"backlash", ""},  // the quantity: keys of files, of JSON and of messages
     {"delay", "src/findings/identification_report.cpp"},         // of the sensors, a key of the identify JSON
     {"delay", "src/identification/procedures/one_inertia.cpp"},  // the option of that name
-    {"delay", "src/findings/arm_report.cpp"},                    // of a joint's current, a key of its JSON
+    {"delay", "src/arm_findings/arm_report.cpp"},                // of a joint's current, a key of its JSON
     {"delay", "src/arm/arm_rig.cpp"},                            // the same in the rig file of an arm
     {"gravity", "src/arm/arm_rig.cpp"},                          // where it points, a key there
     {"friction_drift", "src/arm/trace.cpp"},                     // an arm has no terms: the effect of a joint

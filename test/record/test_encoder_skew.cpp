@@ -2,54 +2,39 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/encoder_skew.h"
+#include "support/led_servo.h"
 
 namespace backlash::record {
 namespace {
 
-constexpr double kInertia = 6, kStiffness = 4e5;  // kg m^2, N m/rad
+/// Encoders that round to an uncertainty of 1e-6 rad, no friction in the motor, and a way across the gap that
+/// samples at 250 Hz need not resolve.
+test::LedServo servo() {
+  test::LedServo s;
+  s.load_coulomb = 30, s.motor_coulomb = 0, s.torque_noise = 0;
+  s.light = true;
+  s.motor_step = s.load_step = std::sqrt(12) * 1e-6;
+  return s;
+}
 
-/// A load led along sines, its motor in closed form: compliance, and half a gap on the side of the torque.
-struct Servo {
-  double gap = 5e-4, friction = 30, noise = 1e-6;  // rad, N m, rad
-  double stiffness = kStiffness, damping = 0;      // N m/rad; N m s/rad, of the motor, which no model knows
-
-  static double load(double t) {
-    return 0.6 * std::sin(2 * M_PI * 0.11 * t) + 0.05 * std::sin(2 * M_PI * 1.3 * t + 1);
-  }
-  static double rate(double t, double h = 1e-4) { return (load(t + h) - load(t - h)) / (2 * h); }
-  double transmitted(double t) const {
-    const double h = 1e-4;
-    return 100 * (load(t + h) - 2 * load(t) + load(t - h)) / (h * h) + friction * std::tanh(rate(t) / 1e-3);
-  }
-  double motor(double t) const {
-    return load(t) + transmitted(t) / stiffness + 0.5 * gap * std::tanh(transmitted(t));
-  }
-  signal::Measured skew(double late, double interval) const {
-    std::mt19937 random(7);
-    std::normal_distribution<double> normal(0, noise);
-    std::vector<double> torque, motors, loads;
-    for (double t = 0; t < 20; t += interval) {
-      motors.push_back(motor(t) + normal(random));
-      loads.push_back(load(t - late) + normal(random));
-      const double h = 1e-3, acceleration = (load(t + h) - 2 * load(t) + load(t - h)) / (h * h);
-      torque.push_back(transmitted(t) + kInertia * acceleration + damping * rate(t));
-    }
-    return encoder_skew({interval, torque, motors, loads, kInertia});
-  }
-};
+signal::Measured skew_of(test::LedServo s, double late, double interval) {
+  s.skew = late;
+  const Record r = s.record(1 / interval);
+  return encoder_skew({interval, r.column(Channel::motor_torque), r.column(Channel::motor_position),
+                       r.column(Channel::load_position), s.motor_inertia});
+}
 
 // Truth within two standard errors, as the estimate says of itself; at 250 Hz as at 1 kHz.
 TEST(EncoderSkew, IsToldBesidePlayComplianceAndFriction) {
   for (const double interval : {1e-3, 4e-3})
     for (const double gap : {0.0, 5e-4, 2e-3})
       for (const double late : {-3e-3, 0.0, 2e-3, 5e-3, 2e-2}) {
-        Servo servo;
-        servo.gap = gap;
-        const signal::Measured skew = servo.skew(late, interval);
+        test::LedServo s = servo();
+        s.gap = gap;
+        const signal::Measured skew = skew_of(s, late, interval);
         EXPECT_NEAR(skew.value, late, 2 * skew.standard_error) << gap << " " << interval;
         EXPECT_EQ(is_clear(skew), late != 0) << skew.value << " +- " << skew.standard_error;
       }
@@ -58,13 +43,13 @@ TEST(EncoderSkew, IsToldBesidePlayComplianceAndFriction) {
 // Drag of the motor is torque that never reaches the teeth: where these are soft it looks like a skew of
 // damping / stiffness, here 0.3 ms.
 TEST(EncoderSkew, DragOfTheMotorIsNone) {
-  Servo servo;
-  servo.stiffness = 2e4;
-  servo.damping = 6;
-  const signal::Measured skew = servo.skew(0, 1e-3);
-  EXPECT_NEAR(skew.value, -servo.damping / servo.stiffness, 1e-4);
+  test::LedServo s = servo();
+  s.stiffness = 2e4;
+  s.motor_viscous = 6;
+  const signal::Measured skew = skew_of(s, 0, 1e-3);
+  EXPECT_NEAR(skew.value, -s.motor_viscous / s.stiffness, 1e-4);
   EXPECT_FALSE(is_clear(skew)) << skew.value << " +- " << skew.standard_error;
-  EXPECT_TRUE(is_clear(servo.skew(2e-2, 1e-3)));
+  EXPECT_TRUE(is_clear(skew_of(s, 2e-2, 1e-3)));
 }
 
 TEST(EncoderSkew, IsNotToldOfALoadThatStands) {

@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/record/even_grid.h"
+#include "backlash_diagnosis/record/resampling.h"
 
 namespace backlash::record {
 namespace {
@@ -97,6 +100,71 @@ TEST(EvenGrid, LeavesWholeRecordsAsTheyAre) {
     EXPECT_EQ(even.record.time, times);
     EXPECT_EQ(even.lost, std::vector<bool>(times.size(), false));
   }
+}
+
+/// A position of 1 Hz and a torque, at 100 Hz.
+Record wave(std::size_t size, double interval = 0.01) {
+  Record r;
+  for (std::size_t k = 0; k < size; ++k) {
+    const double t = interval * double(k);
+    r.time.push_back(t);
+    r.column(Channel::motor_position).push_back(std::sin(2 * M_PI * t));
+    r.column(Channel::motor_torque).push_back(std::cos(2 * M_PI * t));
+  }
+  return r;
+}
+
+/// Without the rows that are not `kept`.
+Record without(const Record& all, const std::function<bool(std::size_t)>& kept) {
+  Record r;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (!kept(k)) continue;
+    r.time.push_back(all.time[k]);
+    for (const Channel channel : {Channel::motor_position, Channel::motor_torque})
+      r.column(channel).push_back(all.column(channel)[k]);
+  }
+  return r;
+}
+
+// The cubic through samples 2 h and h before, h and 2 h behind is off by at most 4 (w h)^4 / 4!: 2.6e-6.
+TEST(EvenlySampled, LostSamplesAreRowsThatAreNamed) {
+  const Record all = wave(300);
+  const EvenGrid grid =
+      evenly_sampled_grid(without(all, [](std::size_t k) { return k % 50 != 30 && (k < 200 || k >= 220); }));
+  ASSERT_EQ(grid.record.size(), all.size());
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    EXPECT_EQ(grid.lost[k], k % 50 == 30 || (k >= 200 && k < 220)) << k;
+    if (k < 200 || k >= 220)
+      EXPECT_NEAR(grid.record.column(Channel::motor_position)[k], all.column(Channel::motor_position)[k],
+                  2.7e-6);
+  }
+  EXPECT_THROW(evenly_sampled(without(all, [](std::size_t k) { return k < 200 || k >= 220; })), BadData);
+  EXPECT_THROW(evenly_sampled_grid(without(all, [](std::size_t k) { return k < 200 || k >= 260; })), BadData);
+}
+
+// Stamps that are late by up to a fifth of an interval: the cubic follows the motion, and no line.
+TEST(EvenlySampled, LateSamplesCountAtTheirTimes) {
+  Record late = wave(300);
+  for (std::size_t k = 1; k + 1 < late.size(); ++k) {
+    late.time[k] += 0.002 * double(k * 7 % 11) / 11;
+    late.column(Channel::motor_position)[k] = std::sin(2 * M_PI * late.time[k]);
+  }
+  const EvenGrid grid = evenly_sampled_grid(late);
+  for (std::size_t k = 2; k + 4 < grid.record.size(); ++k)
+    EXPECT_NEAR(grid.record.column(Channel::motor_position)[k], std::sin(2 * M_PI * grid.record.time[k]),
+                2e-6);
+}
+
+TEST(Resampled, AFasterRecordIsBroughtToTheRateOfTheSlower) {
+  const Record fast = wave(1000, 0.004);
+  const EvenGrid grid = resampled(fast, 0.01);
+  EXPECT_NEAR(grid.record.sampling_interval(), 0.01, 1e-12);
+  for (std::size_t k = 20; k + 20 < grid.record.size(); ++k) {
+    const double t = grid.record.time[k];
+    EXPECT_NEAR(grid.record.column(Channel::motor_position)[k], std::sin(2 * M_PI * t), 1e-6);
+    EXPECT_NEAR(grid.record.column(Channel::motor_torque)[k], std::cos(2 * M_PI * t), 2e-3);  // on a line
+  }
+  EXPECT_THROW(resampled(fast, 0.001), InvalidParameter);
 }
 
 }  // namespace

@@ -123,5 +123,35 @@ TEST(SampleJoiner, JoinsRecordsAndSaysWhatItLeftOut) {
   EXPECT_THROW(joined({motor_part, later}), BadData);
 }
 
+// Two controllers of an arm, each with a time zero and stamps of its own: q = t and 2 t of one clock.
+TEST(SampleJoiner, JointsOfTwoControllersGetOneTimeBase) {
+  std::vector<Record> joints(2);
+  for (std::size_t j = 0; j < 2; ++j) {
+    joints[j].origin = 1000 + 1.503 * double(j);
+    for (int k = 0; k < 500; ++k) {
+      joints[j].time.push_back(0.01 * k);
+      joints[j].column(Channel::motor_position).push_back((1 + double(j)) * (joints[j].origin + 0.01 * k));
+    }
+  }
+  const std::vector<Record> same(2, joints[0]);
+  std::vector<Record> untouched = same;
+  share_time_base(untouched);
+  EXPECT_EQ(untouched[1].column(Channel::motor_position), same[1].column(Channel::motor_position));
+  EXPECT_TRUE(untouched[0].warnings.empty());
+
+  share_time_base(joints);
+  EXPECT_EQ(joints[0].time, joints[1].time);
+  EXPECT_EQ(joints[0].size(), 349u);  // of 500: from 1.51 s on
+  for (std::size_t k = 0; k < joints[0].size(); ++k) {
+    EXPECT_NEAR(joints[0].column(Channel::motor_position)[k], 1000 + joints[0].time[k], 1e-9);
+    EXPECT_NEAR(joints[1].column(Channel::motor_position)[k], 2 * (1000 + joints[1].time[k]), 1e-9);
+  }
+  ASSERT_EQ(joints[0].warnings.size(), 1u);
+  EXPECT_NE(joints[0].warnings[0].find("151 of 500 samples (1.51 s) left out"), std::string::npos)
+      << joints[0].warnings[0];
+  joints[1].origin += 100;
+  EXPECT_THROW(share_time_base(joints), BadData);
+}
+
 }  // namespace
 }  // namespace backlash::record

@@ -5,6 +5,7 @@
 #include <sqlite3.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
@@ -35,10 +36,10 @@ int checked(const std::string& path, std::vector<std::string>* warnings = nullpt
   const auto recording = open_recording(path);
   int count = 0;
   recording->topics();
-  recording->read({kTopic}, [&](const std::string& topic, const std::uint8_t* data, std::size_t size) {
-    EXPECT_EQ(topic, kTopic);
+  recording->read({kTopic}, [&](const Message& read) {
+    EXPECT_EQ(read.topic, kTopic);
     JointState m;
-    read_cdr(data, size, "message", m);
+    read_cdr(read.data, read.size, "message", m);
     const JointState wanted = message_of(count++);
     EXPECT_EQ(m.seconds, wanted.seconds);
     EXPECT_EQ(m.nanoseconds, wanted.nanoseconds);
@@ -177,15 +178,67 @@ TEST(Sqlite, FileAndFolder) {
   const ScratchFolder folder;
   write_sqlite(folder.path("run 0%.db3"));
   EXPECT_EQ(checked(folder.path("run 0%.db3")), kMessages);
-  EXPECT_FALSE(is_recording(folder.path("")));
+  std::vector<std::string> warnings;
+  EXPECT_TRUE(is_recording(folder.path("")));  // without metadata
+  EXPECT_EQ(checked(folder.path(""), &warnings), kMessages);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("all files of the folder were read"), std::string::npos) << warnings[0];
   write(folder.path("metadata.yaml"),
         "rosbag2_bagfile_information:\n  version: 4\n  storage_identifier: sqlite3\n"
         "  relative_file_paths:\n    - run 0%.db3\n");
   EXPECT_TRUE(is_recording(folder.path("")));
-  EXPECT_EQ(checked(folder.path("")), kMessages);
+  EXPECT_EQ(checked(folder.path(""), &warnings), kMessages);
+  EXPECT_TRUE(warnings.empty());
+  for (const char* metadata :  // of recorders that were killed
+       {"", "rosbag2_bagfile_information:\n  storage_identifier: \"\"\n  relative_file_paths: []\n",
+        "rosbag2_bagfile_information:\n  relative_file_paths: [other.db3]\n"}) {
+    write(folder.path("metadata.yaml"), metadata);
+    EXPECT_EQ(checked(folder.path(""), &warnings), kMessages) << metadata;
+    EXPECT_EQ(warnings.size(), 1u) << metadata;
+  }
+  std::filesystem::remove(folder.path("run 0%.db3"));
   write(folder.path("metadata.yaml"),
         "rosbag2_bagfile_information:\n  relative_file_paths:\n    - run.db3.zstd\n");
   EXPECT_THROW(open_recording(folder.path("")), BadData);
+}
+
+// Parts of one recording in files whose names are in another order, the last two overlapping.
+TEST(Mcap, SplitFilesAreReadByTheirTimes) {
+  const ScratchFolder folder;
+  const auto part = [&](const std::string& name, int from, int to, int step) {
+    McapWriter out(folder.path(name));
+    const auto channel = out.add_channel(kTopic, kJointStateType, kJointStateDefinition);
+    for (int i = from; i < to; i += step)
+      out.write(channel, 1'700'000'000'000'000'000u + static_cast<std::uint64_t>(i), to_cdr(message_of(i)));
+    out.close();
+  };
+  part("c_0.mcap", 0, 10, 1);
+  part("a_1.mcap", 10, kMessages, 2);
+  part("b_2.mcap", 11, kMessages, 2);
+  EXPECT_EQ(checked(folder.path("")), kMessages);
+  write(folder.path("d_3.mcap"), "no such file");
+  std::vector<std::string> warnings;
+  EXPECT_EQ(checked(folder.path(""), &warnings), kMessages);
+}
+
+TEST(Mcap, NoiseBehindTheCutIsSaidAndNotRead) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("cut.mcap");
+  std::string noise(2000, '\0');
+  std::uint32_t state = 1;
+  for (char& c : noise) c = static_cast<char>((state = state * 1664525u + 1013904223u) >> 24);
+  for (const char* name : {"plain.mcap", "chunks.mcap", "zstd.mcap"}) {
+    const std::string whole = bytes_of(kFolder + name);
+    write(path, whole.substr(0, whole.size() * 7 / 10) + noise);
+    try {
+      std::vector<std::string> warnings;
+      const int count = checked(path, &warnings);
+      EXPECT_LE(count, kMessages) << name;
+      EXPECT_FALSE(warnings.empty()) << name;
+    } catch (const BadData& error) {
+      EXPECT_NE(std::string(error.what()).find("byte"), std::string::npos) << name << error.what();
+    }
+  }
 }
 
 TEST(Sqlite, DamagedFilesAreRefused) {

@@ -3,6 +3,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
+#include "backlash_diagnosis/base/yaml_tree.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
 
 namespace backlash::rig_file {
@@ -53,7 +54,7 @@ TEST(RigDocument, ReplacesAndAddsInAMapOnOneLine) {
 }
 
 TEST(RigDocument, RefusesWhatItCannotDo) {
-  for (const char* key : {"absent.x", "a.x", "part", "part.deeper.law"})
+  for (const char* key : {"absent.x", "a.x", "part", "part.deeper"})
     EXPECT_THROW(with_value(key, "1"), BadData) << key;
   EXPECT_THROW(RigDocument("- 1\n", "t").set("a", "1"), BadData);
 }
@@ -77,7 +78,9 @@ TEST(RigDocument, ReplacesTheTermsOfAnIdWhereTheFirstOneStood) {
             "runs:\n  - id: cogging\nterms:  # three\n  - id: new\n    x: 1\n\n"
             "  # of the wheel\n  -\n    id: cogging\n    order: 7\nend: 1\n");
   EXPECT_THROW(replaced(kTerms, "delay"), BadData);
-  EXPECT_THROW(replaced("a:\n  - b\nterms: [{id: gravity}]\n", "gravity"), BadData);  // not the list above it
+  EXPECT_EQ(
+      replaced("a:\n  - b\nterms: [{id: gravity}, {id: cogging}]\n", "gravity"),  // not the list above it
+      "a:\n  - b\nterms:\n  - id: new\n    x: 1\n  - {id: cogging}\n");
   EXPECT_THROW(replaced("terms: []\n", "gravity"), BadData);
 }
 
@@ -90,8 +93,46 @@ TEST(RigDocument, AppendsTermsBehindTheLast) {
   RigDocument none("a: 1\nterms: []\n", "t");
   none.append_terms({"  - id: new\n"}, "said");
   EXPECT_EQ(none.text(), "a: 1\n\nterms:                            # said\n  - id: new\n");
-  RigDocument flow("a:\n  - b\nterms: [{id: gravity}]\n", "t");
-  EXPECT_THROW(flow.check_terms(), BadData);
+}
+
+// A list in brackets, on one line or several, gets lines; what stands in it is not touched.
+TEST(RigDocument, AppendsTermsToAListInBrackets) {
+  const auto appended = [](const std::string& text) {
+    RigDocument document(text, "t");
+    document.append_terms({"  - id: new\n    x: 1\n"}, "not said");
+    EXPECT_NO_THROW(parse_yaml(document.text(), "t")) << document.text();
+    return document.text();
+  };
+  EXPECT_EQ(appended("terms: [{id: gravity, points: [1, 2]}]  # one\nend: 1\n"),
+            "terms:  # one\n  - {id: gravity, points: [1, 2]}\n  - id: new\n    x: 1\nend: 1\n");
+  EXPECT_EQ(
+      appended("terms: [\n  {id: gravity,  # of the arm, [sic]\n   name: 'a]'}, {id: cogging}\n]\nend: 1\n"),
+      "terms:\n  - {id: gravity,  # of the arm, [sic]\n    name: 'a]'}\n  - {id: cogging}\n"
+      "  - id: new\n    x: 1\nend: 1\n");
+}
+
+TEST(RigDocument, ReplacesAndAddsInNestedBrackets) {
+  RigDocument document(
+      "gear: {motor: {inertia: 3, friction: {forward: 1, backward: 2}}, mesh: {law: \"x, {y}\"}}  # all\n"
+      "sensors: {}\n"
+      "long: {a: 1,   # first\n"
+      "       b: 2}\n",
+      "t");
+  document.set("gear.motor.inertia", "5", "not said");
+  document.set("gear.motor.friction.backward", "7");
+  document.set("gear.motor.viscous", "4");
+  document.set("gear.mesh.law", "z");
+  document.set("sensors.skew", "1e-3");
+  document.set("long.b", "3");
+  document.set("long.a", "0");
+  EXPECT_EQ(
+      document.text(),
+      "gear: {motor: {viscous: 4, inertia: 5, friction: {forward: 1, backward: 7}}, mesh: {law: z}}  # all\n"
+      "sensors: {skew: 1e-3}\n"
+      "long: {a: 0,   # first\n"
+      "       b: 3}\n");
+  document.set("gear.motor.friction", "9");
+  EXPECT_NE(document.text().find("friction: 9}"), std::string::npos) << document.text();
 }
 
 TEST(RigDocument, DropsTheCommentsBeforeTheFirstKey) {

@@ -2,6 +2,7 @@
 """What the tests of the diagnoser node share: the node as a process, a coarse curve, records to publish."""
 import copy
 import csv
+import functools
 import os
 import subprocess
 import tempfile
@@ -35,11 +36,22 @@ def run_tool(name, *arguments, codes=(0,)):
     return done
 
 
+@functools.lru_cache(None)
+def coarse_curve(rate):
+    """Text of a coarse curve: quick to build, and good enough where the test is not about its sharpness."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "curve.yaml")
+        run_tool("build_curve", rig_path(), "--out", path, "--points", 11, "--periods", 3, "--seeds", 4,
+                 "--sample-rate", rate)
+        with open(path) as stream:
+            return stream.read()
+
+
 def build_curve(folder, rate=1000):
-    """A coarse curve: quick to build, and good enough where the test is not about its sharpness."""
+    """A file with it in the folder, for a test that may change it."""
     path = os.path.join(folder, "curve.yaml")
-    run_tool("build_curve", rig_path(), "--out", path, "--points", 11, "--periods", 3, "--seeds", 4,
-             "--sample-rate", rate)
+    with open(path, "w") as stream:
+        stream.write(coarse_curve(rate))
     return path
 
 

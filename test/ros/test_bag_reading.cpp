@@ -171,9 +171,8 @@ TEST_F(BagReading, WhatIsDamagedIsToldBeforeWhatIsMissing) {
   const auto last = damaged.rfind("compression=lz4", index);
   damaged[last + 100] = static_cast<char>(damaged[last + 100] ^ 0x10);
   overwrite(damaged);
-  for (const char* topic : {"/nowhere", kTopic.c_str()})
-    EXPECT_NE(refusal(topic).find("damaged bag: a chunk cannot be unpacked"), std::string::npos)
-        << refusal(topic);
+  EXPECT_NE(refusal("/nowhere").find("damaged bag: a chunk cannot be unpacked"), std::string::npos)
+      << refusal("/nowhere");
 }
 
 /// The header of an encrypted bag as rosbag writes it: one more field, taken from the padding behind it.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <future>
 #include <string>
 
@@ -62,6 +63,35 @@ TEST(JointDiagnostics, WarnsWhileEstimatesAreLeftOut) {
   EXPECT_EQ(after.level, diagnostic_msgs::DiagnosticStatus::OK);
   EXPECT_EQ(value_of(after, "Estimates left out"), value_of(busy, "Estimates left out"));
   allowed.set_value();
+  monitor.stop();
+}
+
+// The zero of an encoder that moves while the joint is watched; the commands say the same of the bag.
+TEST(JointDiagnostics, SaysWhatIsWrongWithTheRecording) {
+  ros::Time::init();
+  test::RecordRecipe recipe;
+  recipe.noise = 1e-3;
+  record::Record spoilt = test::make_record(recipe);
+  std::vector<double>& motor = spoilt.column(record::Channel::motor_position);
+  for (std::size_t k = motor.size() / 2; k < motor.size(); ++k) motor[k] += 1;  // rad, travel: 0.01
+  const record::RecordCheck offline = record::check_record(spoilt).check;
+  const auto found = std::find_if(offline.findings.begin(), offline.findings.end(), [](const auto& finding) {
+    return finding.kind == record::FindingKind::jump;
+  });
+  ASSERT_NE(found, offline.findings.end());
+
+  JointMonitor monitor(monitor_settings("elbow"));
+  feed(monitor, spoilt);
+  DiagnosticsSettings settings;
+  settings.stale = 600;
+  JointDiagnostics diagnostics(monitor, nullptr, "joint_states", settings);
+  Tasks tasks;
+  diagnostics.add_to(tasks);
+  const Status status = tasks.status("elbow: signal quality");
+  EXPECT_EQ(status.level, diagnostic_msgs::DiagnosticStatus::WARN);
+  const std::string jump = value_of(status, "jump");
+  EXPECT_EQ(jump, found->message);
+  EXPECT_NE(status.message.find(jump), std::string::npos) << status.message;
   monitor.stop();
 }
 

@@ -305,7 +305,7 @@ TEST_F(Commands, ReportHasTheDocumentedShape) {
   for (const auto& item : json.items()) keys.push_back(item.key());
   EXPECT_EQ(keys, (std::vector<std::string>{"schema_version", "record", "time", "estimates", "verdict",
                                             "declared_wrong", "apd", "warnings", "rig", "rig_digest", "curve",
-                                            "version"}));
+                                            "version", "record_check"}));
   EXPECT_EQ(json["schema_version"], 1);
   EXPECT_EQ(json["estimates"][0]["method"], "apd_skewness");
   std::vector<std::string> methods;

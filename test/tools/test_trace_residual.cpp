@@ -223,7 +223,6 @@ TEST_F(TraceResidual, Refusals) {
   write("short.csv", head.substr(0, head.rfind('\n') + 1));
   write("nan.csv", "time,motor_torque,motor_position\n0,1,0\n0.004,nan,0\n0.008,1,0\n");
   write("text.csv", "no record\n");
-  record("emps", "", 40, 3, "--duration 12 --sample-rate 100", "slow.csv");
   done("convert_record test.csv half.csv --from 6");
   write("bad.yaml", "schema_version: 1\nname: 3\n");
   write("motor.csv", without_load(read("train.csv")));
@@ -246,7 +245,6 @@ TEST_F(TraceResidual, Refusals) {
       {line("emps.yaml", "train.csv", "nan.csv"), 65, "nan"},
       {line("emps.yaml", "short.csv", "test.csv"), 65, "short"},
       {line("emps.yaml", "train.csv", "short.csv"), 65, "short"},
-      {line("emps.yaml", "train.csv", "slow.csv"), 65, "sampled"},
       {line("emps.yaml", "train.csv test.csv", "test.csv"), 65,
        "100 % of the test record test.csv are samples"},
       {line("emps.yaml", "train.csv half.csv", "test.csv"), 65, "samples of the training record half.csv"},

@@ -82,15 +82,9 @@ struct ArmRig {
 /// Of a joint by its name; none: there is no such joint.
 std::optional<std::size_t> index_of(const ArmRig& rig, const std::string& joint);
 
-/// Whether a file is a URDF, as it begins like XML. Throws MissingInput.
-bool is_urdf(const std::string& path);
-
 /// What a URDF by itself says as a rig: all its joints that move but the held ones, with drives whose values
 /// nobody knows (all 0) and torques at the joint as channel, the base level. Throws MissingInput, BadData.
 ArmRig arm_rig_of_urdf(const std::string& path, const HeldJoints& held = {});
-
-/// Whether a rig file is that of an arm: it has `urdf`. Throws MissingInput, BadData; for a URDF, too.
-bool is_arm_rig(const std::string& path);
 
 /// Throws MissingInput, BadData (file, line, key, value, limit).
 ArmRig load_arm_rig(const std::string& path);

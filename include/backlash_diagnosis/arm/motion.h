@@ -19,6 +19,7 @@ struct ArmRecord {
 
 /// The joints of the rig out of a record. Throws BadData where one of them, or a channel of it, is missing:
 /// motor_position and the rig's channel are needed; speeds are taken from positions where they are absent.
+/// All get one time base (record/sample_joiner.h), whichever controller published them since when.
 /// With load_position the links move as that says, which an elastic gear does not do with its motor.
 ArmRecord arm_record(const std::vector<record::JointRecord>& joints, const ArmRig& rig,
                      const std::string& name);

@@ -22,6 +22,8 @@ struct YamlNode {
   enum class Kind { null, plain, quoted, list, map };  ///< plain and quoted are scalars
   Kind kind = Kind::null;
   int line = 0;                              ///< from 1
+  int column = 0;                            ///< from 0, bytes: where it begins on that line
+  bool flow = false;                         ///< list and map: in brackets, not by indentation
   std::string scalar;                        ///< plain and quoted
   std::vector<const YamlNode*> items;        ///< list
   std::map<std::string, YamlEntry> entries;  ///< map

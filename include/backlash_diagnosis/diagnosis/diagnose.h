@@ -64,14 +64,24 @@ struct DiagnosisInput {
   std::optional<std::string> lock_contradicted;  // why the output is not locked although the file says so
 };
 
-/// An estimator: its name in reports, what it needs in plain words, and itself. All are in one table, in the
-/// order of reports; a new one is a file in this room and a line there.
+/// An estimator: its name in reports, the channels that it needs (one of each group) and what else, and
+/// itself. All are in one table, in the order of reports; a new one is a file in this room and a line there.
 struct DiagnosisMethod {
-  std::string name, needs;
-  bool by_curve;  // needs a monitoring curve
+  std::string name;
+  std::vector<std::vector<record::Channel>> channels;  // none: the signal of diagnosis.apd
+  std::string more;                                    // in plain words
+  bool by_curve;                                       // needs a monitoring curve
   Estimate (*estimate)(const DiagnosisInput&);
 };
 const std::vector<DiagnosisMethod>& diagnosis_method_table();
+
+/// What a method needs, in plain words: "motor_position, and motor_torque or sensor_torque; output locked".
+std::string needs_of(const DiagnosisMethod& method);
+
+/// The first group of channels of which a record has none, in plain words; empty: it has all that the method
+/// needs.
+std::string lacking_channel(const DiagnosisMethod& method, const record::Record& record,
+                            const std::optional<ApdSettings>& apd);
 
 /// Names of all estimators.
 const std::vector<std::string>& diagnosis_methods();

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "backlash_diagnosis/findings/trace_report.h"
+#include "backlash_diagnosis/report/record_check_report.h"
 #include "backlash_diagnosis/report/trace_files.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
@@ -22,10 +23,10 @@ class TraceFolder {
 
   const report::TraceFiles& files() const { return files_; }
 
-  /// Writes all. Plots are drawn by a Python script; where that fails the page says so instead. Throws
-  /// CannotWrite, and BadData as traced_rig_text().
-  void write(const identification::Trace& trace, const rig_file::RigFile& declared,
-             const TraceInputs& inputs) const;
+  /// Writes all; `checks` of the records go into the report. Plots are drawn by a Python script; where that
+  /// fails the page says so instead. Throws CannotWrite, and BadData as traced_rig_text().
+  void write(const identification::Trace& trace, const rig_file::RigFile& declared, const TraceInputs& inputs,
+             const std::vector<report::CheckedFile>& checks = {}) const;
 
  private:
   std::string folder_;

@@ -79,6 +79,9 @@ struct Identification {
   std::vector<std::string> warnings;
 
   std::optional<SeveralMachines> several;  // where the records contradict each other; errors hold them all
+  /// Why the machine is none of the rig file's kind: it explains less than half of what a channel does. The
+  /// errors of the values that this channel tells are infinite then.
+  std::optional<std::string> unexplained;
   std::optional<SpeedCalibration> speed_calibration;
   std::optional<PositionCalibration> position_calibration;
   std::vector<CalibrationTrace> calibration_traces;

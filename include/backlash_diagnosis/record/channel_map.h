@@ -31,8 +31,9 @@ struct ChannelSource {
   std::string topic = "joint_states";
   std::string name;  // in the messages
   Field field = Field::position;
-  double scale = 1;   // unit of the channel over that of the field, != 0; < 0 turns the sign
-  double offset = 0;  // unit of the channel
+  double scale = 1;       // unit of the channel over that of the field, != 0; < 0 turns the sign
+  double offset = 0;      // unit of the channel
+  bool optional = false;  // a record without it is read as well
 };
 
 /// A column of a CSV that has names and units of its own.

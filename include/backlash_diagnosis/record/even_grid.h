@@ -9,6 +9,13 @@
 
 namespace backlash::record {
 
+/// A position goes on as it was; a torque may jump.
+bool is_smooth(Channel channel);
+
+/// Between samples `j` and the next the line, or Lagrange's cubic through the two to either side.
+double interpolated(const std::vector<double>& time, const std::vector<double>& values, std::size_t j,
+                    double t, bool cubic);
+
 struct EvenGrid {
   Record record;           ///< positions by a cubic between samples, all else on the line
   std::vector<bool> lost;  ///< of each row: no sample was recorded within half an interval

@@ -51,6 +51,8 @@ class Record {
   std::vector<double> time;           ///< s
   std::vector<std::string> warnings;  ///< what the reader saw and mended: repeated stamps dropped, gaps
   double origin = 0;                  ///< s since 1970 of time 0; 0 where `time` is as in the file
+  std::size_t repeated_stamps = 0;    ///< samples that the reader dropped, as their stamp was that before
+  double first_repeated_stamp = 0;    ///< s, valid where repeated_stamps > 0
 
   std::size_t size() const { return time.size(); }
   bool has(Channel channel) const { return !column(channel).empty(); }

@@ -55,4 +55,12 @@ class SampleJoiner {
 /// `name` and all warnings are kept; samples that are left out are told. Throws BadData where none is left.
 Record joined(const std::vector<Record>& parts);
 
+/// Counts the times of a record from another time 0 [s since 1970].
+void set_origin(Record& record, double origin);
+
+/// Records of several joints on one time base: that of the first, where all have a sample on either side.
+/// Each says by its `origin` when its time 0 was. Records that have the same times already stay as they are.
+/// The first one's warnings tell what was left out. Throws BadData where nothing is left.
+void share_time_base(std::vector<Record>& joints);
+
 }  // namespace backlash::record

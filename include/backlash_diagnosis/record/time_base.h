@@ -10,6 +10,8 @@
 
 namespace backlash::record {
 
+class Record;
+
 enum class StampVerdict {
   accept,     ///< later than the stamp accepted before, or the first
   repeated,   ///< equal to it: drop this sample
@@ -27,6 +29,9 @@ class StampChecker {
   std::size_t accepted() const { return accepted_; }
   std::size_t repeated() const { return repeated_; }
   double first_repeated() const { return first_repeated_; }  ///< s, valid where repeated() > 0
+
+  /// Tells a record what was dropped.
+  void count_into(Record& record) const;
 
   /// Warning for Record::warnings, empty where nothing was dropped; `where` names the place ("line 17") if
   /// known.

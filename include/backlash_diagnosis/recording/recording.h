@@ -18,10 +18,18 @@ struct Topic {
   std::string encoding;    // of the messages; only "cdr" can be read
 };
 
+/// The bytes of a message, and when it was received [ns].
+struct Message {
+  const std::string& topic;
+  std::uint64_t time;
+  const std::uint8_t* data;
+  std::size_t size;
+};
+
 class Recording {
  public:
-  /// Gets topic, bytes of a message and their number; the bytes are valid until it returns.
-  using Take = std::function<void(const std::string& topic, const std::uint8_t* data, std::size_t size)>;
+  /// The bytes are valid until it returns.
+  using Take = std::function<void(const Message& message)>;
 
   virtual ~Recording() = default;
 
@@ -29,18 +37,21 @@ class Recording {
   virtual std::vector<Topic> topics() = 0;
 
   /// The messages on some topics as they were received: SQLite by time stamp, MCAP chunk by chunk, sorted by
-  /// log time within each. Throws BadData "path: ..." with the offset or row where something is damaged.
+  /// log time within each, files of a folder by their times. Of an MCAP file that is damaged those before the
+  /// damage, which warnings() then tell; else throws BadData "path: ..." with the row.
   virtual void read(const std::vector<std::string>& topics, const Take& take) = 0;
 
   /// What an operator should know of the last read: a file that was cut off.
   virtual std::vector<std::string> warnings() const { return {}; }
 };
 
-/// Whether a path is that of a recording: .mcap, .db3, or a folder with rosbag2's metadata.yaml.
+/// Whether a path is that of a recording: .mcap, .db3, or a folder with rosbag2's metadata.yaml or such
+/// files.
 bool is_recording(const std::string& path);
 
-/// Of a folder all its files are read in the order of metadata.yaml, of a file only that one. Throws
-/// MissingInput when it cannot be opened, BadData when it is no recording or compressed as a whole file.
+/// Of a folder the files that metadata.yaml names are read, or all where it is not there or does not name
+/// them, in the order of their times; of a file only that one. Throws MissingInput when it cannot be opened,
+/// BadData when it is no recording or compressed as a whole file.
 std::unique_ptr<Recording> open_recording(const std::string& path);
 
 }  // namespace backlash::recording

@@ -23,8 +23,9 @@ struct FittedValues {
   const std::map<std::string, std::string>& units;  // of all of these
 };
 
-/// All that changes the text throws BadData with the name, the line and the key where the document does not
-/// have what is asked for in block style: maps whose keys, and lists whose items, have lines of their own.
+/// Maps and lists may be written by indentation or in brackets, on one line or several. All that changes the
+/// text throws BadData with the name, the line and the key where the document does not have what is asked
+/// for.
 class RigDocument {
  public:
   /// `name` is that of the file, for messages.
@@ -36,15 +37,16 @@ class RigDocument {
   /// The machine that the text describes now. Throws as rig_file_from_text().
   RigFile read() const;
 
-  /// Replaces the scalar, or the map on one line, under `key` ("gear_train.motor.inertia"), and the comment
-  /// of its line unless `comment` is empty. A key that is absent becomes the first of its map, which must
-  /// exist. Numbers get six digits.
+  /// Replaces the scalar, or the map in brackets, under `key` ("gear_train.motor.inertia"), and the comment
+  /// of its line unless `comment` is empty or the key stands in brackets. A key that is absent becomes the
+  /// first of its map, which must exist. Numbers get six digits.
   void set(const std::string& key, const std::string& value, const std::string& comment = "");
   void set(const std::string& key, double value, const std::string& comment = "");
 
   /// All that was fitted, in the units of the file (of the motor shaft where it says motor_side: true), each
-  /// with its standard error as comment. Friction becomes a map of both directions where they differ,
-  /// backlash is said as the file says it: backlash, half_gap or backlash_angle.
+  /// with its standard error as comment; what has an infinite one stays as it is. Friction becomes a map of
+  /// both directions where they differ, backlash is said as the file says it: backlash, half_gap or
+  /// backlash_angle.
   void set_fitted(const FittedValues& found);
 
   /// A section at the end, in place of one of this name; `entries` are its lines.
@@ -60,8 +62,8 @@ class RigDocument {
   /// `comment` stands beside the new key.
   void append_terms(const std::vector<std::string>& entries, const std::string& comment);
 
-  /// Throws what append_terms() would.
-  void check_terms() const;
+  /// Throws what set_fitted(), set_contact_law() and append_terms() would, for any values of this machine.
+  void check_changes(const model::Rig& declared) const;
 
   /// Puts entries in place of the terms whose id `is_old`. Throws BadData where there is none.
   void replace_terms(const std::function<bool(const std::string& id)>& is_old,
@@ -76,10 +78,21 @@ class RigDocument {
   struct Item {
     std::size_t begin, end, column;
   };
+  /// A place in the text: a line and a column, both from 0.
+  struct Place {
+    std::size_t line, column;
+  };
 
   YamlTree tree() const { return parse_yaml(text(), name_); }
   void set_directional(const std::string& key, double mean, double asymmetry, const std::string& comment);
   void set_backlash(const model::Rig& rig, const std::string& comment);
+  Place begin_of(const YamlNode& node) const;
+  Place end_of(const YamlNode& node, const std::string& key) const;
+  void replace(const YamlNode& node, const std::string& key, const std::string& value,
+               const std::string& comment);
+  void insert(const YamlNode& map, const std::string& key, const std::string& value,
+              const std::string& comment);
+  void list_by_lines(const std::string& key);
   Item item(const YamlEntry& list, const YamlNode& node) const;
 
   std::string name_;

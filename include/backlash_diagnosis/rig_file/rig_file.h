@@ -34,6 +34,12 @@ RigFile load_rig_file(const std::string& path);
 /// The same from text; `source` stands for the path in messages.
 RigFile rig_file_from_text(const std::string& text, const std::string& source);
 
+/// Whether a file is a URDF, as it begins like XML. Throws MissingInput.
+bool is_urdf(const std::string& path);
+
+/// Whether a rig file is that of an arm: it has `urdf`. Throws MissingInput, BadData; for a URDF, too.
+bool is_arm_rig(const std::string& path);
+
 /// The rig with the machine's values of a waveform fit in place of its own: the inverse of what
 /// RigFile::diagnosis.waveform was made by. Not below what half a coupling's inertia leaves; what the rig has
 /// no place for (friction_speed, the sensor's gain and lag) is left out.

@@ -49,6 +49,7 @@ class JointDiagnostics {
   void describe_excitation(const MonitorState& state, Status& status);
   void describe_signal(const MonitorState& state, Status& status);
   void describe_curve(const MonitorState& state, Status& status);
+  void look_at_recording();
   void add_history(Status& status) const;
   void summarise_input(const MonitorState& state, double age, Status& status);
 
@@ -57,6 +58,8 @@ class JointDiagnostics {
   std::string topic_;
   DiagnosticsSettings settings_;
   std::vector<Concern> concerns_;
+  std::vector<record::Finding> found_;                   // in the newest samples
+  double next_look_ = 0;                                 // s, of the steady clock
   long problems_ = 0, not_a_number_ = 0, replaced_ = 0;  // counted up to the last update
   std::mutex mutex_;
 };

@@ -15,6 +15,7 @@
 
 #include "backlash_diagnosis/diagnosis/earlier_waveform.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
+#include "backlash_diagnosis/record/record_check.h"
 #include "backlash_diagnosis/ros/background_fits.h"
 #include "backlash_diagnosis/ros/diagnosis_worker.h"
 #include "backlash_diagnosis/ros/job.h"
@@ -84,6 +85,9 @@ class JointMonitor {
   /// is due it copies the window; the rest of the work is not done here.
   std::optional<PeriodReport> take(const ros::Time& stamp, const record::ChannelValues& values,
                                    const std::string& problem, const std::string& topic);
+
+  /// What the samples of the last `seconds` show to be wrong with them, as the commands see it.
+  record::RecordCheck check_recording(double seconds) const;
 
   /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s]
   /// of wall time, then diagnoses the latest `periods` (0: all kept). `waveform` is what its latest fit

@@ -28,7 +28,7 @@ std::vector<JointRig> load_joint_rigs(Parameters& parameters);
 std::optional<record::ChannelMap> read_channels(Parameters& parameters, const std::string& name,
                                                 const std::string& joint);
 
-/// As a robot publishes a joint of its URDF: position, velocity, and as effort that channel.
+/// As a robot publishes a joint of its URDF: position, velocity where it does, and as effort that channel.
 record::ChannelMap robot_channels(const std::string& joint, record::Channel effort);
 
 /// Path of a file of a joint in a folder: a joint's name may have parts, a file's name may not.

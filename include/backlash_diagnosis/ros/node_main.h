@@ -13,4 +13,11 @@ namespace backlash::ros_bridge {
 int node_main(int argc, char** argv, const std::string& name, const char* help,
               const std::function<int()>& run);
 
+/// The nodes. They are not in their mains, as what they include takes seconds to compile. The last is in
+/// ros_arm.
+int simulator_main(int argc, char** argv);
+int diagnoser_main(int argc, char** argv);
+int exciter_main(int argc, char** argv);
+int change_watch_main(int argc, char** argv);
+
 }  // namespace backlash::ros_bridge

@@ -6,7 +6,9 @@
 #include <ros/publisher.h>
 #include <sensor_msgs/JointState.h>
 
+#include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,6 +32,21 @@ class SimulatedMachine {
   virtual std::string true_backlash() const = 0;  // with its unit, for people
   virtual simulation::IntegratorStatistics statistics() const = 0;
 };
+
+class Parameters;
+
+/// An arm that is to be simulated: the room ros_arm reads and makes it, and is loaded only then.
+struct ArmToSimulate {
+  std::string rig;           // name
+  double sampling_rate = 0;  // Hz
+  std::function<std::unique_ptr<SimulatedMachine>(const ros::NodeHandle& handle,
+                                                  const ros::NodeHandle& private_handle)>
+      make;
+};
+
+/// Of ros_arm: reads ~rig and what overrides it. `torque_timeout` [s] as of a joint. Throws InvalidParameter,
+/// MissingInput, BadData.
+extern "C" void backlash_read_arm(Parameters& parameters, double torque_timeout, ArmToSimulate& arm);
 
 /// Latched, on rig_description.
 ros::Publisher publish_rig_description(const ros::NodeHandle& handle, const std::string& description);

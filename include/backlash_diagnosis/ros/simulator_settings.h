@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/geared_arm/geared_arm.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
+#include "backlash_diagnosis/ros/simulated_machine.h"
 
 namespace backlash::ros_bridge {
 
@@ -20,17 +20,8 @@ struct JointSettings {
   double torque_timeout = 0;  // s, simulated, after which a torque_command is zero again; 0: held for ever
 };
 
-/// A simulated arm.
-struct ArmSettings {
-  geared_arm::GearedArm arm;  // with the parameters that override its file
-  std::string description;    // as of a joint
-  std::string urdf;           // text
-  bool set_robot_description = true;
-  double torque_timeout = 0;  // as of a joint
-};
-
 struct SimulatorSettings {
-  std::optional<ArmSettings> arm;
+  std::optional<ArmToSimulate> arm;
   std::vector<JointSettings> joints;  // without arm at least one, all with the same sampling rate
   bool named_joints = false;  // several, or a list of one: each has topics and services below its own name
   std::string rig;            // name of the (first) rig

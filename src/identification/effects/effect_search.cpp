@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../fit/record_sense.h"
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/model/mesh_resonance.h"
 #include "backlash_diagnosis/record/shared_samples.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "contradicting_records.h"
@@ -67,32 +66,33 @@ Records records_of(const model::Rig& rig, const std::vector<record::Record>& tra
   if (train.empty()) throw CannotIdentify("no training record");
   require_unseen(train, test);
   Records records;
+  const double interval = common_interval(train, test);
   for (const record::Record& record : train) {
     records.names.push_back(record.name);
-    records.train.push_back(traced_data(record, rig));
+    records.train.push_back(traced_data(record, rig, 0, interval));
   }
   records.names.push_back(test.name);
   double torque = 0;  // what the model says of the test record knows nothing of that record's torque
-  for (const ServoData& data : records.train) torque = std::max(torque, usual_torque(data.torque));
-  records.test = traced_data(test, rig, torque);
-  require_same_rate(records.train, records.test);
+  for (const ServoData& data : records.train) torque = std::max(torque, model::usual_torque(data.torque));
+  records.test = traced_data(test, rig, torque, interval);
   return records;
 }
 
 /// Parameters of the machine without and with effects, and the steps.
 void describe_machine(const SearchResult& result, const std::vector<ServoPrediction>& on_test,
-                      const BeliefSettings& belief, Trace& trace) {
+                      const SearchSettings& settings, Trace& trace) {
   const Hypothesis& found = result.found;
   trace.base = result.declared.base->fit.machine.rig;
   trace.augmented = found.fitted->fit.machine.rig;
   trace.base_parameters =
       fitted_values(*result.declared.base, result.declared.declared->parameters.size()).machine;
-  const FittedValues values = fitted_values(*found.fitted, found.declared->parameters.size());
+  FittedValues values = fitted_values(*found.fitted, found.declared->parameters.size());
+  allow_for_valley(values, *found.fitted, settings.fit);
   trace.parameters = values.machine;
   for (const auto& [name, value] : found.held) trace.parameters[name] = {value, std::nan("")};
   for (const Hypothesis* h : {&result.declared, &found})
     for (const FitParameter& p : h->base->start.parameters) trace.units[p.name] = p.unit;
-  trace.steps = found_effects(found, values.effects, on_test, belief);
+  trace.steps = found_effects(found, values.effects, on_test, settings.belief);
   trace.rejected = rejected_effects(found);
 }
 
@@ -257,7 +257,7 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   Trace trace;
   trace.cutoff = settings.fit.cutoff;
   const std::vector<ServoPrediction> on_test = predicted_by_all(found, records.test, settings.fit);
-  describe_machine(result, on_test, settings.belief, trace);
+  describe_machine(result, on_test, settings, trace);
   describe_errors(result, on_test, records, settings.fit, trace);
   if (found.other_teeth)
     trace.notes.emplace_back(
@@ -278,12 +278,6 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   if (trace.unexplained)
     trace.several = several_of(declared, records, settings, most_left(trace, found), progress);
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
-  for (std::size_t i = 0; i < records.train.size(); ++i) {
-    const ServoData& d = records.train[i];
-    for (const std::string& warning :
-         unit_warnings({records.names[i], d.interval, d.torque, d.motor, d.load}, declared))
-      trace.warnings.push_back(warning);
-  }
   return trace;
 }
 

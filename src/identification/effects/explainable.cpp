@@ -213,10 +213,11 @@ Remainder remainder(const std::vector<Predicted>& records, bool deflection, doub
                     const ExplainableSettings& settings) {
   const Samples s = samples(records, deflection, cutoff, settings);
   Remainder out;
-  if (s.residual.size() < settings.least_samples) return out;
+  if (s.residual.empty()) return out;
   out.rms = root_mean_square(s.residual);
   out.signal = deviation(s.measured);
   out.floor = std::sqrt(s.floor / double(s.residual.size()));
+  if (s.residual.size() < settings.least_samples) return out;  // how much is left they say all the same
   out.unevenness = unevenness(s.residual);
   const Eigen::VectorXd y =
       Eigen::Map<const Eigen::VectorXd>(s.residual.data(), Eigen::Index(s.residual.size()));

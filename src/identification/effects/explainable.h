@@ -31,7 +31,7 @@ struct Remainder {
   double signal = 0;     // the same unit: standard deviation of what was measured
   double explained = 0;  // the same unit: what the found effects of this channel took away; 0: none
   signal::PredictedShare explainable;
-  std::vector<Follows> follows;  // each state alone, the one that says most first
+  std::vector<Follows> follows;  // each state alone, the one that says most first; none: too few samples
   /// Of 20 parts of the records, the largest sum of squares over their mean: noise that does not change is
   /// about the same everywhere.
   double unevenness = 0;
@@ -41,9 +41,10 @@ struct Remainder {
 /// repeats; else 0.
 double repeated_noise(const Predicted& record, bool deflection);
 
-/// Of all samples that count. States: position (and the strongest orders of it), velocity, acceleration,
-/// transmitted torque and path since the last reversal, all of them as the model has them, and time. The
-/// measured torque is none of them: it holds its own noise.
+/// Of all samples that count. Too few (least_samples) say how much is left, and not what it follows. States:
+/// position (and the strongest orders of it), velocity, acceleration, transmitted torque and path since the
+/// last reversal, all of them as the model has them, and time. The measured torque is none of them: it holds
+/// its own noise.
 Remainder remainder(const std::vector<Predicted>& records, bool deflection, double cutoff,
                     const ExplainableSettings& settings);
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../fit/valley.h"
 #include "learned.h"
 #include "unseen_gain.h"
 
@@ -83,13 +84,23 @@ FittedValues fitted_values(const BandFit& fitted, std::size_t declared) {
   const Unknowns unknowns(fitted.start);
   FittedValues out;
   for (std::size_t i = 0; i < fitted.start.parameters.size(); ++i) {
-    const signal::Measured m = unknowns.parameter(fit.fit, i);
+    const signal::Measured m = unknowns.parameter(fit, i);
     if (i < declared)
       out.machine[fitted.start.parameters[i].name] = m;
     else
       out.effects.push_back(m);
   }
   return out;
+}
+
+void allow_for_valley(FittedValues& values, const BandFit& fitted, const FitSettings& settings) {
+  BandFit best = fitted;  // the machine itself stays: the unseen record was judged by it
+  const std::map<std::string, double> valley = search_valley(best, settings);
+  if (valley.empty()) return;
+  for (const FitParameter& p : fitted.start.parameters)
+    if (const auto at = values.machine.find(p.name); at != values.machine.end())
+      at->second.standard_error = std::hypot(at->second.standard_error, valley.at(p.name),
+                                             p.get(best.fit.machine.rig) - p.get(fitted.fit.machine.rig));
 }
 
 std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<signal::Measured> fitted,

@@ -22,6 +22,8 @@ std::size_t fitted_count(const Candidate& candidate, std::size_t t);
 
 /// `declared`: how many of the first parameters are the machine's.
 FittedValues fitted_values(const BandFit& fitted, std::size_t declared);
+/// The errors of the machine's values where these nearly mix (fit/valley.h).
+void allow_for_valley(FittedValues& values, const BandFit& fitted, const FitSettings& settings);
 
 /// One step per effect; a second term of the same kind belongs to the step of the first. `on_test`: as
 /// predicted_by_all() gives it.

@@ -65,7 +65,9 @@ Unexplained described(const ChannelRemainder& c, bool linear, const ExplainableS
                             r.rms / r.floor),
                 {r.explainable.value, r.explainable.lower, r.explainable.upper}};
   const std::string states = followed_states(r, settings);
-  if (!explainable(r, settings))
+  if (r.follows.empty())
+    u.signature += "the records are too short to say what it follows";
+  else if (!explainable(r, settings))
     u.signature += r.unevenness > settings.uneven
                        ? "follows no state of the machine, but comes and goes, which noise does not"
                    : c.channel == "deflection"

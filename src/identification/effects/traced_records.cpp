@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../fit/record_sense.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "candidates.h"
@@ -25,9 +25,16 @@ constexpr double kFaster = 1.5;            // choice: times speed or torque
 
 }  // namespace
 
-ServoData traced_data(const record::Record& record, const model::Rig& rig, double torque) {
-  ServoData data = servo_data(record, rig, torque);
-  require_sense({record.name, data.interval, data.torque, data.motor, data.load}, model::load_side(rig));
+double common_interval(const std::vector<record::Record>& train, const record::Record& test) {
+  double longest = test.sampling_interval();
+  for (const record::Record& r : train) longest = std::max(longest, r.sampling_interval());
+  return longest;
+}
+
+ServoData traced_data(const record::Record& record, const model::Rig& rig, double torque, double interval) {
+  const bool own = interval < (1 + kSameRate) * record.sampling_interval();
+  ServoData data = servo_data(own ? record::evenly_sampled_grid(record) : record::resampled(record, interval),
+                              rig, torque);
   if (simulation::load_moves_freely(rig)) {
     if (data.load.empty())
       throw CannotIdentify(record.name + " has no load_position, which a rig with two inertias needs");
@@ -44,13 +51,6 @@ ServoData traced_data(const record::Record& record, const model::Rig& rig, doubl
                          " moves too slowly: its speed stands out of the noise of the encoder in " +
                          std::to_string(100 * moving / long(data.size())) + " % of the samples");
   return data;
-}
-
-void require_same_rate(const std::vector<ServoData>& train, const ServoData& test) {
-  for (const ServoData& d : train)
-    if (std::fabs(d.interval / test.interval - 1) > kSameRate)
-      throw CannotIdentify("records sampled every " + std::to_string(d.interval) + " s and every " +
-                           std::to_string(test.interval) + " s cannot be compared");
 }
 
 std::vector<std::string> range_warnings(const std::vector<ServoData>& train, const ServoData& test,

@@ -12,11 +12,13 @@ namespace backlash::identification {
 
 /// Throws CannotIdentify for a record without load position, which a rig with two inertias needs, with a load
 /// that stands, or of a motor so slow that its speed drowns in the noise of its encoder; and what
-/// servo_data() throws.
-ServoData traced_data(const record::Record& record, const model::Rig& rig, double usual_torque = 0);
+/// servo_data() throws. `interval` [s]: that of all records, which those of a higher rate are brought to; 0:
+/// the record's own.
+ServoData traced_data(const record::Record& record, const model::Rig& rig, double usual_torque = 0,
+                      double interval = 0);
 
-/// Throws CannotIdentify where a record is sampled at another rate than `test`.
-void require_same_rate(const std::vector<ServoData>& train, const ServoData& test);
+/// s: between the samples of the slowest record.
+double common_interval(const std::vector<record::Record>& train, const record::Record& test);
 
 /// Where the test record leaves what the training records know: travel, speed, torque.
 std::vector<std::string> range_warnings(const std::vector<ServoData>& train, const ServoData& test,

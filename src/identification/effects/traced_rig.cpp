@@ -53,15 +53,7 @@ std::string traced_rig_text(const rig_file::RigFile& declared, const Trace& trac
 }
 
 void check_traced_rig_text(const rig_file::RigFile& declared) {
-  rig_file::RigDocument(declared).check_terms();
-  Trace trace;
-  trace.augmented = model::load_side(declared.rig);
-  for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
-    if (!p.known_to(declared.rig) || p.get(declared.rig) == 0) continue;
-    trace.parameters[p.name] = {p.get(trace.augmented), 0};
-    trace.units[p.name] = p.unit;
-  }
-  traced_rig_text(declared, trace);
+  rig_file::RigDocument(declared).check_changes(declared.rig);
 }
 
 }  // namespace backlash::identification

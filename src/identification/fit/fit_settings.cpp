@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
+#include "backlash_diagnosis/model/mesh_resonance.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 
@@ -12,10 +12,10 @@ namespace backlash::identification {
 namespace {
 
 // In units of the mesh resonance; simulation.
-constexpr double kCutoff = 60 / kTriedResonance;       // the oscillation after a touch is seen
-constexpr double kRoughCutoff = 15 / kTriedResonance;  // it is not, the deflection under load is
+constexpr double kCutoff = 60 / model::kTriedResonance;       // the oscillation after a touch is seen
+constexpr double kRoughCutoff = 15 / model::kTriedResonance;  // it is not, the deflection under load is
 constexpr double kFeedback =
-    50 / kTriedResonance;  // 1/s per Hz: the oscillation stays, chaos in the gap does not
+    50 / model::kTriedResonance;  // 1/s per Hz: the oscillation stays, chaos in the gap does not
 
 constexpr double kHighestCutoff =
     0.2;                          // theory: of the sampling rate, up to which differences are derivatives
@@ -36,7 +36,7 @@ double motion_cutoff(const std::vector<ServoData>& data) {
 FitSettings with_bands(FitSettings settings, const model::Rig& rig, const std::vector<ServoData>& data) {
   const double highest = kHighestCutoff / data.front().interval;
   double torque = 0;
-  for (const ServoData& d : data) torque = std::max(torque, usual_torque(d.torque));
+  for (const ServoData& d : data) torque = std::max(torque, model::usual_torque(d.torque));
   const double resonance = mesh_resonance(rig, torque);
   const bool free = simulation::load_moves_freely(rig) && resonance > 0;
   if (settings.cutoff == 0)

@@ -11,8 +11,10 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "contact_edge.h"
+#include "reach.h"
 #include "sampling.h"
 
 namespace backlash::identification {
@@ -93,6 +95,12 @@ void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
   covariance = growth.asDiagonal() * covariance * growth.asDiagonal();
 }
 
+/// Of standard errors, from one covariance to another.
+double median_growth(const Eigen::VectorXd& after, const Eigen::VectorXd& before) {
+  const Eigen::VectorXd growth = after.cwiseQuotient(before).cwiseSqrt();
+  return signal::median({growth.data(), growth.data() + growth.size()});
+}
+
 /// s: of a coupled machine the deflection under viscous friction, which is declared, looks like a skew.
 double skew_of_friction(const model::Rig& rig) {
   const double stiffness =
@@ -141,6 +149,10 @@ void allow_for_left(signal::LeastSquaresFit& fit, Eigen::Index rows, double left
 }
 
 }  // namespace
+
+double farthest_logarithm() {
+  return 3 * std::log(kFarthest);
+}
 
 double size(const Misfit& misfit) {
   return std::hypot(misfit.torque, misfit.deflection);
@@ -312,17 +324,18 @@ Machine Unknowns::machine(const Eigen::VectorXd& values) const {
   return m;
 }
 
-signal::Measured Unknowns::parameter(const signal::LeastSquaresFit& fit, std::size_t i) const {
-  signal::Measured m = fit.parameter(Eigen::Index(i));
+signal::Measured Unknowns::parameter(const MachineFit& fit, std::size_t i) const {
+  signal::Measured m = fit.fit.parameter(Eigen::Index(i));
   const FitParameter& p = start_.parameters[i];
   if (!p.positive) return m;
   const double slope = 1 - std::pow(limited(m.value) / std::log(kFarthest), 2);
   m.value = p.get(start_.rig) * std::exp(limited(m.value));
   m.standard_error *= m.value * slope;
+  if (fit.reach.size() > 0) m.standard_error = std::max(m.standard_error, fit.reach[Eigen::Index(i)]);
   return m;
 }
 
-std::map<std::string, signal::Measured> Unknowns::parameters(const signal::LeastSquaresFit& fit) const {
+std::map<std::string, signal::Measured> Unknowns::parameters(const MachineFit& fit) const {
   std::map<std::string, signal::Measured> all;
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     all[start_.parameters[i].name] = parameter(fit, i);
@@ -351,7 +364,11 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   signal::widen_jacobian(
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
       kWideStep * unknowns.scale(), ahead(unknowns, records), true);
+  const Eigen::VectorXd independent = fit.fit.covariance.diagonal();
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
+  fit.reach = reach_of_values(
+      fit, start, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); }, rows,
+      median_growth(fit.fit.covariance.diagonal(), independent));
   const double free = double(rows) / double(block) - double(unknowns.size());  // degrees of freedom
   fit.fit.covariance *=
       std::pow(signal::student_t_quantile(0.975, std::max(1.0, free)) / signal::kNormalQuantile975, 2);
@@ -359,10 +376,10 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   add_equations(fit, start);
   const Eigen::VectorXd edge = shift_of_contact_edge(fit, records);
   fit.fit.covariance += edge * edge.transpose();
-  const Eigen::VectorXd bias = sampling_bias(fit, records);
+  const auto [bias, rounding] = sampling_effect(fit, records);
   fit.fit.values -= bias;
   fit.machine = unknowns.machine(fit.fit.values);
-  fit.fit.covariance += std::pow(kUnsureOfSampling, 2) * bias * bias.transpose();
+  fit.fit.covariance += std::pow(kUnsureOfSampling, 2) * bias * bias.transpose() + rounding;
   if (start.rig.coupled)
     allow_for_left(
         fit.fit, rows,

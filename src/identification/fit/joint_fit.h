@@ -86,7 +86,11 @@ class RecordSet {
 struct MachineFit {
   Machine machine;
   signal::LeastSquaresFit fit;  // of the values of Unknowns(start)
+  Eigen::VectorXd reach;        // of the errors of small values (reach.h); empty before judge_errors()
 };
+
+/// Of a positive value over its start: where its bound is reached to a hundredth.
+double farthest_logarithm();
 
 /// The numbers that a fit changes: parameters (of those that are positive the logarithm, relative to the
 /// start), then delay and encoder offset of each record, as far as they are unknown.
@@ -102,8 +106,8 @@ class Unknowns {
   /// One row per value: a wide prior about its start, so that what the records do not tell stays there.
   Eigen::VectorXd prior(const Eigen::VectorXd& values) const;
   Machine machine(const Eigen::VectorXd& values) const;
-  std::map<std::string, signal::Measured> parameters(const signal::LeastSquaresFit& fit) const;
-  signal::Measured parameter(const signal::LeastSquaresFit& fit, std::size_t i) const;
+  std::map<std::string, signal::Measured> parameters(const MachineFit& fit) const;
+  signal::Measured parameter(const MachineFit& fit, std::size_t i) const;
 
  private:
   std::size_t records() const { return start_.calibrations.size(); }

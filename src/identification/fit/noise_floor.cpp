@@ -5,8 +5,8 @@
 #include <cmath>
 #include <complex>
 
-#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/model/mesh_resonance.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/spectrum.h"
@@ -66,10 +66,22 @@ Spring mesh_spring(const model::Rig& rig, const std::vector<double>& torque) {
   if (rig.mesh.rigid || !rig.mesh.contact->power_contact()) return {};
   const model::PowerContact law = *rig.mesh.contact->power_contact();
   const double lever = rig.mesh.lever(),
-               depth = rig.mesh.contact->static_penetration(usual_torque(torque) / lever);
+               depth = rig.mesh.contact->static_penetration(model::usual_torque(torque) / lever);
   const double force = law.stiffness * std::pow(depth, law.exponent);
   const double stiffness = law.exponent == 1 ? law.stiffness : law.exponent * force / depth;
   return {stiffness * lever * lever, (law.damping + law.loss * force) * lever * lever};
+}
+
+}  // namespace
+
+namespace {
+
+/// Without what lies between the grid of an encoder.
+std::vector<double> recorded(const std::vector<double>& x, const std::vector<bool>& lost) {
+  std::vector<double> kept;
+  for (std::size_t k = 0; k < x.size(); ++k)
+    if (lost.empty() || !lost[k]) kept.push_back(x[k]);
+  return kept;
 }
 
 }  // namespace
@@ -80,7 +92,7 @@ RecordNoise record_noise(const ServoData& data) {
   noise.torque = by_median(data.torque, signal::white_noise(data.torque));
   if (data.load.empty()) return noise;
   noise.load = noise_deviation(data.load);
-  noise.load_step = signal::resolution(data.load);
+  noise.load_step = signal::resolution(recorded(data.load, data.lost));
   return noise;
 }
 

@@ -1,8 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/fit/output_error.h"
 
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
+
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "multi_start.h"
+#include "valley.h"
 
 namespace backlash::identification {
 namespace {
@@ -28,18 +35,55 @@ Machine start_machine(const model::Rig& rig, std::size_t records, const OutputEr
   return machine;
 }
 
+constexpr double kVanishes = 2;  // choice: standard errors, below which a play may be none
+
+bool is_play(const FitParameter& p) {
+  return p.name == rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::backlash).name;
+}
+
+/// Teeth without play are another machine than those with a little: no force jumps when they change flanks.
+/// So where the play vanishes it is held against the one with some. Nothing where that leaves less.
+std::optional<BandFit> without_play(const BandFit& fitted, const std::vector<ServoData>& records,
+                                    const FitSettings& settings) {
+  Machine machine = fitted.start;
+  const auto play = std::find_if(machine.parameters.begin(), machine.parameters.end(), is_play);
+  if (play == machine.parameters.end()) return std::nullopt;
+  const signal::Measured found =
+      Unknowns(fitted.start).parameter(fitted.fit, std::size_t(play - machine.parameters.begin()));
+  if (!(found.value < kVanishes * found.standard_error)) return std::nullopt;
+  play->set(machine.rig, 0);
+  machine.parameters.erase(play);
+  BandFit other = fit_to_records(records, machine, settings);
+  const auto left = [&](const MachineFit& fit) {
+    return fitted.records.rows(fit.machine.rig, fit.machine.calibrations).norm();
+  };
+  if (!(left(other.fit) <= left(fitted.fit))) return std::nullopt;
+  judge_errors(other.fit, other.start, other.records);
+  return other;
+}
+
 }  // namespace
 
 OutputError fit_output_error(const model::Rig& start, const std::vector<ServoData>& records,
                              const OutputErrorSettings& asked) {
   const FitSettings settings = with_bands(asked.fit, start, records);
   BandFit fitted = fit_to_records(records, start_machine(start, records.size(), asked), settings);
+  const std::map<std::string, double> valley = search_valley(fitted, settings);
   judge_errors(fitted.fit, fitted.start, fitted.records);
+  OutputError result;
+  if (auto other = without_play(fitted, records, settings)) {
+    const auto play = std::find_if(fitted.start.parameters.begin(), fitted.start.parameters.end(), is_play);
+    const signal::Measured least = Unknowns(fitted.start).parameters(fitted.fit).at(play->name);
+    result.parameters[play->name] = {0, least.value + least.standard_error};
+    fitted = std::move(*other);
+  }
   allow_for_misfit(fitted.fit, fitted.records);
   const Machine& machine = fitted.fit.machine;
-  OutputError result;
   result.rig = machine.rig;
-  result.parameters = Unknowns(fitted.start).parameters(fitted.fit.fit);
+  for (const auto& [name, value] : Unknowns(fitted.start).parameters(fitted.fit))
+    result.parameters[name] = value;
+  for (const auto& [name, error] : valley)
+    result.parameters.at(name).standard_error = std::hypot(result.parameters.at(name).standard_error, error);
   result.calibrations = machine.calibrations;
   for (std::size_t r = 0; r < records.size(); ++r)
     result.predictions.push_back(predict_servo(machine.rig, records[r], settings, machine.calibrations[r]));

@@ -5,8 +5,9 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/model/mesh_resonance.h"
+#include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "backlash_diagnosis/simulation/plant.h"
@@ -63,7 +64,7 @@ simulation::SolverSettings solver(const model::Rig& rig, const ServoData& data) 
   settings.relative_tolerance = kTolerance;
   settings.position_tolerance = kTolerance * largest;
   settings.velocity_tolerance =
-      settings.position_tolerance * 2 * M_PI * mesh_resonance(rig, usual_torque(data.torque));
+      settings.position_tolerance * 2 * M_PI * mesh_resonance(rig, model::usual_torque(data.torque));
   return settings;
 }
 
@@ -104,27 +105,66 @@ ServoData sampled_machine(const model::Rig& fitted, const ServoData& data, const
   return with_columns(data, std::move(command.torque), std::move(motor), std::move(load));
 }
 
-Eigen::VectorXd sampling_bias(const MachineFit& fit, const RecordSet& records) {
-  const Machine& machine = fit.machine;
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(fit.fit.values.size());
-  if (!simulation::load_moves_freely(machine.rig) || machine.rig.coupled || machine.deflection_only)
-    return none;
-  std::vector<ServoData> sampled;
-  try {
-    for (std::size_t i = 0; i < records.records().size(); ++i) {
-      const PreparedServo& record = records.records()[i];
-      sampled.push_back(
-          sampled_machine(machine.rig, record.data(), machine.calibrations[i], record.feedback));
-    }
-  } catch (const IntegrationError&) {
-    return none;
-  }
-  const Eigen::VectorXd rows = records.of_others(sampled).rows(machine.rig, machine.calibrations);
+namespace {
+
+constexpr int kPhases = 4;  // choice (time): of the grid of an encoder
+
+/// Of an encoder: rad, 0 where its white noise is more than what rounding leaves, and dithers it.
+double grid_of(const std::vector<double>& position) {
+  const double step = signal::resolution(position);
+  return signal::position_noise(position) < 2 * step / std::sqrt(12.0) ? step : 0;
+}
+
+std::vector<double> rounded(std::vector<double> position, double step, double phase) {
+  if (step > 0)
+    for (double& q : position) q = step * (std::round(q / step + phase) - phase);
+  return position;
+}
+
+/// Values that the fit takes from records of its own machine, less what it is made of.
+Eigen::VectorXd moved_by(const std::vector<ServoData>& data, const MachineFit& fit,
+                         const RecordSet& records) {
+  const Eigen::VectorXd rows = records.of_others(data).rows(fit.machine.rig, fit.machine.calibrations);
   const Eigen::MatrixXd& jacobian = fit.fit.jacobian;
   const Eigen::VectorXd unit = jacobian.colwise().norm().cwiseInverse();
   const Eigen::MatrixXd scaled = jacobian * unit.asDiagonal();
   return -unit.cwiseProduct(
       signal::solve_symmetric(signal::gram(scaled), scaled.topRows(rows.size()).transpose() * rows));
+}
+
+}  // namespace
+
+SamplingEffect sampling_effect(const MachineFit& fit, const RecordSet& records) {
+  const Machine& machine = fit.machine;
+  const Eigen::Index n = fit.fit.values.size();
+  SamplingEffect effect = {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n)};
+  if (!simulation::load_moves_freely(machine.rig) || machine.rig.coupled || machine.deflection_only)
+    return effect;
+  std::vector<ServoData> sampled;
+  std::vector<double> motor_steps, load_steps;
+  try {
+    for (std::size_t i = 0; i < records.records().size(); ++i) {
+      const PreparedServo& record = records.records()[i];
+      sampled.push_back(
+          sampled_machine(machine.rig, record.data(), machine.calibrations[i], record.feedback));
+      motor_steps.push_back(grid_of(record.data().motor));
+      load_steps.push_back(grid_of(record.data().load));
+    }
+  } catch (const IntegrationError&) {
+    return effect;
+  }
+  effect.bias = moved_by(sampled, fit, records);
+  for (int i = 0; i < kPhases; ++i) {
+    const double phase = (i + 0.5) / kPhases - 0.5;
+    std::vector<ServoData> read;
+    for (std::size_t r = 0; r < sampled.size(); ++r)
+      read.push_back(with_columns(sampled[r], sampled[r].torque,
+                                  rounded(sampled[r].motor, motor_steps[r], -phase),
+                                  rounded(sampled[r].load, load_steps[r], phase)));
+    const Eigen::VectorXd moved = moved_by(read, fit, records) - effect.bias;
+    effect.rounding += moved * moved.transpose() / kPhases;
+  }
+  return effect;
 }
 
 }  // namespace backlash::identification

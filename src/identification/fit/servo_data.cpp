@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
+#include "backlash_diagnosis/model/mesh_resonance.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
@@ -28,7 +28,7 @@ constexpr double kSureSpeed =
 constexpr double kWidestBand = 0.2;   // theory: of the sampling rate, up to which differences are derivatives
 constexpr double kNarrower = 0.9;     // choice: from one band that is tried to the next
 constexpr double kLeastPeriods = 10;  // choice: of the band, in the record: below, nothing is smoothed
-constexpr double kLoadRateBand = 120 / kTriedResonance;  // simulation: in units of the mesh resonance
+constexpr double kLoadRateBand = 120 / model::kTriedResonance;  // simulation: in units of the mesh resonance
 
 std::vector<double> scaled(const record::Record& record, record::Channel channel, double factor) {
   std::vector<double> values = record.column(channel);
@@ -151,11 +151,16 @@ record::Record load_side(const record::Record& record, const model::Rig& rig) {
 }
 
 ServoData servo_data(const record::Record& raw, const model::Rig& rig, double torque) {
+  return servo_data(record::evenly_sampled_grid(raw), rig, torque);
+}
+
+ServoData servo_data(const record::EvenGrid& grid, const model::Rig& rig, double torque) {
+  const record::Record& record = grid.record;
   for (const record::Channel channel : {record::Channel::motor_torque, record::Channel::motor_position})
-    if (!raw.has(channel)) throw CannotIdentify(raw.name + " has no " + record::channel_name(channel));
-  const record::Record record = record::evenly_sampled(raw);
+    if (!record.has(channel)) throw CannotIdentify(record.name + " has no " + record::channel_name(channel));
   const double ratio = rig.motor_axis_ratio();
   ServoData data;
+  data.lost = grid.lost;
   data.interval = record.sampling_interval();
   data.torque = scaled(record, record::Channel::motor_torque, ratio);
   data.motor = scaled(record, record::Channel::motor_position, 1 / ratio);
@@ -174,7 +179,7 @@ ServoData servo_data(const record::Record& raw, const model::Rig& rig, double to
   const double highest = kWidestBand / data.interval;
   const double resonance =
       simulation::load_moves_freely(rig)
-          ? mesh_resonance(model::load_side(rig), torque > 0 ? torque : usual_torque(data.torque))
+          ? mesh_resonance(model::load_side(rig), torque > 0 ? torque : model::usual_torque(data.torque))
           : 0;
   data.load_rate_cutoff = resonance > 0 ? std::min(kLoadRateBand * resonance, highest) : highest;
   take_rates_of_load(data);

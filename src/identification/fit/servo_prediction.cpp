@@ -23,6 +23,7 @@ constexpr double kEnds = 3;  // theory: periods of the cutoff at either end, whe
 constexpr double kStarts =
     12;  // theory: time constants of the feedback: of the load's start exp(-12) is left
 constexpr double kSureSpeed = 5;  // choice: standard deviations of the motor speed, from which it has a sign
+constexpr double kMemory = 0.5;   // theory: periods of its cutoff that a low-pass mixes
 constexpr long kReach = 2;        // theory: samples to either side that the five-point difference uses
 
 // A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
@@ -243,6 +244,24 @@ PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, dou
   for (long k = begin; k < n - ends; ++k) {
     settled[k] = 1;
     counts[k] = direction[k] != 0;
+  }
+  leave_out_lost(drawn);
+}
+
+/// What was not recorded, what a low-pass makes of it, and behind more than a sample what the load does that
+/// was driven by it.
+void PreparedServo::leave_out_lost(bool drawn) {
+  const std::vector<bool>& lost = data_->lost;
+  const long n = static_cast<long>(lost.size());
+  const long memory = kReach + std::lround(kMemory / (cutoff * data_->interval));
+  for (long begin = 0, end = 0; begin < n; begin = end) {
+    end = begin + 1;
+    if (!lost[std::size_t(begin)]) continue;
+    while (end < n && lost[std::size_t(end)]) ++end;
+    const long behind =
+        drawn && end - begin > 1 ? std::lround(kStarts / (feedback * data_->interval)) : memory;
+    for (long k = std::max(0L, begin - memory); k < std::min(n, end + behind); ++k)
+      settled[std::size_t(k)] = counts[std::size_t(k)] = 0;
   }
 }
 

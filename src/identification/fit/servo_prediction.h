@@ -46,6 +46,7 @@ struct PreparedServo {
   std::vector<char> counts;    // settled, and the motor slides
 
  private:
+  void leave_out_lost(bool drawn);
   ServoResiduals coupled_residuals(const model::Rig& rig, const Calibration& calibration) const;
 
   const ServoData* data_;  // of the caller

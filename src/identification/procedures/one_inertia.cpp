@@ -24,17 +24,20 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kLargestDelay = 2;     // choice: sampling intervals
-constexpr int kDelayBits = 12;          // choice: the search ends within 0.001 of an interval
-constexpr double kVagueDelay = 1;       // choice: sampling intervals of standard error
-constexpr double kLeastPeriods = 40;    // choice: of the cutoff
-constexpr double kPeriods = 100;        // choice: where the cutoff is chosen
-constexpr double kLeastShare = 0.05;    // choice: of the samples in each direction
-constexpr double kStanding = 4;         // choice: standard deviations of the speed's noise
-constexpr double kSignNoise = 1e-3;     // choice: of the speed: how sharply its sign is taken
-constexpr double kSignBandwidth = 4;    // choice: but not below four times the cutoff
-constexpr double kReach = 0.3;          // theory: periods of its cutoff that the speed is sharp to
-constexpr std::size_t kBlocks = 30;     // choice: left out one at a time, for the errors
+constexpr double kLargestDelay = 2;   // choice: sampling intervals
+constexpr int kDelayBits = 12;        // choice: the search ends within 0.001 of an interval
+constexpr double kVagueDelay = 1;     // choice: sampling intervals of standard error
+constexpr double kLeastPeriods = 40;  // choice: of the cutoff
+constexpr double kPeriods = 100;      // choice: where the cutoff is chosen
+constexpr double kLeastShare = 0.05;  // choice: of the samples in each direction
+constexpr double kStanding = 4;       // choice: standard deviations of the speed's noise
+constexpr double kSignNoise = 1e-3;   // choice: of the speed: how sharply its sign is taken
+constexpr double kShowing = 0.05;     // choice: of the speed: noise that hides its sign (kStanding) only near
+                                      // standstill
+constexpr double kSignBandwidth = 4;  // choice: but not below four times the cutoff
+constexpr double kReach = 0.3;        // theory: periods of its cutoff that the speed is sharp to
+constexpr std::size_t kSeen = 2;      // theory: samples to either side
+constexpr std::size_t kBlocks = 30;   // choice: left out one at a time, for the errors
 constexpr double kUnsureOfNoise = 0.3;  // choice: of what noise of the acceleration makes of the inertia
 constexpr double kMuchLeft = 0.1;       // choice: relative error that is worth a warning
 
@@ -97,14 +100,23 @@ double speed_noise(double position_noise, double cutoff, double interval) {
   return position_noise * 2 * M_PI * cutoff * std::sqrt(2 * cutoff * interval / 3);
 }
 
-/// Cutoff [Hz] at which the noise of the speed is kSignNoise of the speed.
-double speed_bandwidth(double position_noise, const std::vector<double>& speed, double interval) {
+/// Cutoff [Hz] at which the noise of the speed is that share of the speed.
+double speed_bandwidth(double position_noise, const std::vector<double>& speed, double interval,
+                       double share) {
   const double size = Eigen::Map<const Eigen::VectorXd>(speed.data(), Eigen::Index(speed.size())).norm() /
                       std::sqrt(double(speed.size()));
-  return std::pow(kSignNoise * size / speed_noise(position_noise, 1, interval), 2.0 / 3);
+  return std::pow(share * size / speed_noise(position_noise, 1, interval), 2.0 / 3);
 }
 
-Signals prepare(const record::Record& record, double cutoff) {
+/// A record on an even grid, with what is known of lost samples beside what its stamps show.
+record::EvenGrid even(const record::Record& recorded, const std::vector<bool>& lost) {
+  record::EvenGrid grid = record::evenly_sampled_grid(recorded);
+  if (lost.size() == grid.lost.size()) grid.lost = lost;
+  return grid;
+}
+
+Signals prepare(const record::EvenGrid& grid, double cutoff) {
+  const record::Record& record = grid.record;
   Signals s;
   const std::vector<double>& position = record.column(record::Channel::motor_position);
   const std::size_t n = record.size();
@@ -122,13 +134,19 @@ Signals prepare(const record::Record& record, double cutoff) {
   s.time = record.time;
   s.torque = over_second_difference(record.column(record::Channel::motor_torque));
   const std::vector<double> speed = signal::derivative(position, t);
-  const double sharp_cutoff = std::clamp(speed_bandwidth(s.position_noise, speed, t),
-                                         std::min(kSignBandwidth * s.cutoff, 0.4 / t), 0.4 / t);
+  // Sharper than the noise of the speed allows nothing would be seen to slide.
+  const double sharpest = std::max(s.cutoff, speed_bandwidth(s.position_noise, speed, t, kShowing));
+  const double sharp_cutoff = std::min(std::clamp(speed_bandwidth(s.position_noise, speed, t, kSignNoise),
+                                                  std::min(kSignBandwidth * s.cutoff, 0.4 / t), 0.4 / t),
+                                       sharpest);
   const std::vector<double> sharp = signal::low_pass(speed, t, sharp_cutoff);
   std::vector<double> sign(n);
   for (std::size_t k = 0; k < n; ++k) sign[k] = (sharp[k] > 0) - (sharp[k] < 0);
   const double threshold = kStanding * speed_noise(s.position_noise, sharp_cutoff, t);
   s.slides = sliding(sharp, threshold, 1 + std::lround(kReach / (sharp_cutoff * t)));
+  for (std::size_t k = 0; k < n; ++k)  // as far as a second difference of a difference sees
+    for (std::size_t j = k < kSeen ? 0 : k - kSeen; j <= std::min(n - 1, k + kSeen); ++j)
+      if (grid.lost[j]) s.slides[k] = 0;
   s.columns.resize(n, 4);
   const std::vector<double> filtered[] = {
       low_pass_sliding(s, second_derivative(position, t)), low_pass_sliding(s, over_second_difference(speed)),
@@ -157,10 +175,10 @@ void require_both_directions(const std::string& name, const Signals& s) {
   double forward = 0, backward = 0;
   for (const auto k : s.used) (s.columns(k, 1) > 0 ? forward : backward) += 1;
   if (s.used.size() < 64 || std::min(forward, backward) < kLeastShare * double(s.time.size()))
-    throw CannotIdentify(
-        fmt::format("{}: moves forward in {:.3g} % and backward in {:.3g} % of the samples: Coulomb friction "
-                    "and offset cannot be told apart",
-                    name, 100 * forward / double(s.time.size()), 100 * backward / double(s.time.size())));
+    throw CannotIdentify(fmt::format(
+        "{}: moves for certain, beyond the noise of its speed, forward in {:.3g} % and backward in "
+        "{:.3g} % of the samples: Coulomb friction and offset cannot be told apart",
+        name, 100 * forward / double(s.time.size()), 100 * backward / double(s.time.size())));
 }
 
 /// Delay [samples] with the smallest residual.
@@ -259,8 +277,9 @@ double spread(const Eigen::VectorXd& values) {
 
 OneInertia identify_one_inertia(const record::Record& recorded, const OneInertiaOptions& options) {
   require_channels(recorded);
-  const record::Record record = record::evenly_sampled(recorded);
-  const Signals s = prepare(record, options.cutoff);
+  const record::EvenGrid grid = even(recorded, options.lost);
+  const record::Record& record = grid.record;
+  const Signals s = prepare(grid, options.cutoff);
   require_both_directions(record.name, s);
   if (options.delay && !(std::fabs(*options.delay) <= kLargestDelay * s.interval))
     throw InvalidParameter("delay", *options.delay, "must be within two sampling intervals");
@@ -303,10 +322,11 @@ OneInertia identify_one_inertia(const record::Record& recorded, const OneInertia
   return out;
 }
 
-OneInertia applied(const OneInertia& machine, const record::Record& recorded) {
+OneInertia applied(const OneInertia& machine, const record::Record& recorded, const std::vector<bool>& lost) {
   require_channels(recorded);
-  const record::Record record = record::evenly_sampled(recorded);
-  const Signals s = prepare(record, machine.cutoff);
+  const record::EvenGrid grid = even(recorded, lost);
+  const record::Record& record = grid.record;
+  const Signals s = prepare(grid, machine.cutoff);
   if (s.used.size() < 2) throw CannotIdentify(record.name + ": stands still");
   const Eigen::VectorXd torque =
       picked(low_pass_sliding(s, signal::delayed(s.torque, machine.delay.value / s.interval)), s.used);

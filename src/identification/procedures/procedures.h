@@ -18,6 +18,7 @@ struct CaseRecord {
   record::Record record;  // load side
   bool has_load = false;
   bool motor_moves = true, load_moves = true;
+  std::vector<bool> lost = {};  // of each sample: it was not recorded
   bool any() const { return true; }
   bool drive() const { return motor_moves && load_moves; }  // motor and load together
   bool motor_alone() const { return has_load && motor_moves && !load_moves; }

@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "declared_terms.h"
 #include "procedures.h"
 
 namespace backlash::identification {
@@ -55,10 +56,22 @@ void require_possible(const OneInertia& found, const std::string& record) {
   if (least.value < -by_noise * least.standard_error) refuse("coulomb friction of the one direction", least);
 }
 
+/// What the rig file declares beside inertia and friction is no part of either.
+void take_off_terms(IdentificationCase& c) {
+  for (CaseRecord& r : c.records) {
+    if (!r.record.has(record::Channel::motor_torque) || !r.record.has(record::Channel::motor_position))
+      continue;
+    const std::vector<double> taken = torque_of_terms(r.record, c.declared);
+    std::vector<double>& torque = r.record.column(record::Channel::motor_torque);
+    for (std::size_t k = 0; k < taken.size(); ++k) torque[k] -= taken[k];
+  }
+}
+
 /// A record, and the machine that it tells by itself.
 struct Told {
   const record::Record* record;
   OneInertia machine;
+  const std::vector<bool>* lost;
 };
 
 /// All records that tell one; what is left out is a warning. Throws CannotIdentify where none does.
@@ -67,7 +80,9 @@ std::vector<Told> told_by_each(IdentificationCase& c) {
   std::vector<std::string> reasons;
   for (const CaseRecord& r : c.records) {
     try {
-      all.push_back({&r.record, identify_one_inertia(r.record)});
+      OneInertiaOptions options;
+      options.lost = r.lost;
+      all.push_back({&r.record, identify_one_inertia(r.record, options), &r.lost});
       require_possible(all.back().machine, r.record.name);
     } catch (const CannotIdentify& error) {
       if (!all.empty() && all.back().record == &r.record) all.pop_back();
@@ -125,6 +140,7 @@ void take_machine(const OneInertia& found, IdentificationCase& c) {
 
 ProcedureReport run_one_inertia(IdentificationCase& c) {
   ProcedureReport report{"one_inertia", {}, ""};
+  take_off_terms(c);
   const std::vector<Told> told = told_by_each(c);
   std::vector<OneInertia> alone, together;
   for (const Told& t : told) alone.push_back(t.machine);
@@ -133,7 +149,7 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
     OneInertia machine = found;
     machine.cutoff = t.machine.cutoff;
     machine.delay = t.machine.delay;
-    together.push_back(applied(machine, *t.record));
+    together.push_back(applied(machine, *t.record, *t.lost));
     report.records.push_back(t.record->name);
     c.result.torque.push_back(trace_of(together.back(), *t.record));
   }

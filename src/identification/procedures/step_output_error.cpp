@@ -55,10 +55,11 @@ Stretch most_telling(const CaseRecord& r, double seconds) {
   return {&r, best, best + length, (sum[best + length - 1] - sum[best]) / (double(length) * interval)};
 }
 
-record::Record cut(const Stretch& s) {
+record::EvenGrid cut(const Stretch& s) {
   const std::vector<double>& t = s.record->record.time;
   const double end = s.to < t.size() ? t[s.to] : INFINITY;
-  return s.record->record.slice(t[s.from], end);
+  const auto lost = s.record->lost.begin();
+  return {s.record->record.slice(t[s.from], end), {lost + long(s.from), lost + long(s.to)}};
 }
 
 std::vector<Stretch> telling_stretches(const IdentificationCase& c) {

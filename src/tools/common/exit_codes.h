@@ -2,6 +2,8 @@
 // How the commands end: the verdict, or after sysexits.h what went wrong.
 #pragma once
 
+#include "backlash_diagnosis/diagnosis/verdict.h"
+
 namespace backlash::tools {
 
 enum ExitCode {
@@ -15,5 +17,21 @@ enum ExitCode {
   kInternal = 70,
   kCannotWrite = 73,
 };
+
+inline int exit_code(diagnosis::Grade grade) {
+  switch (grade) {
+    case diagnosis::Grade::good:
+    case diagnosis::Grade::ungraded:
+      return kHealthy;
+    case diagnosis::Grade::watch:
+      return kWatch;
+    case diagnosis::Grade::service:
+    case diagnosis::Grade::stop:
+      return kFault;
+    case diagnosis::Grade::cannot_tell:
+      break;
+  }
+  return kInconclusive;
+}
 
 }  // namespace backlash::tools

@@ -41,6 +41,9 @@ void write_joints(const std::vector<record::JointRecord>& joints, const std::str
 /// The same for any text file.
 void write_text(const std::string& path, const std::string& text);
 
+/// As the name of a file to write: standard output.
+inline const std::string kStandardOutput = "-";
+
 /// Throws UsageError where the output would overwrite one of the inputs, CannotWrite where its folder does
 /// not exist or it is a folder itself.
 void check_output(const std::string& path, const std::vector<std::string>& inputs);

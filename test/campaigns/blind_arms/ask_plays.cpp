@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "answers.h"
-#include "backlash_diagnosis/findings/arm_play_report.h"
+#include "backlash_diagnosis/arm_findings/arm_play_report.h"
 #include "record.h"
 
 namespace blind_arms {
@@ -41,7 +41,7 @@ void print(const std::string& name, const Count& c) {
 }
 
 /// The answer of the joint: the last estimate is the motor's where there is one encoder.
-const Estimate& answer_of(const backlash::findings::ArmPlayReport& report, std::size_t joint) {
+const Estimate& answer_of(const backlash::arm_findings::ArmPlayReport& report, std::size_t joint) {
   return report.traverses.empty() ? report.plays[joint].estimate : report.traverses[joint].estimate;
 }
 
@@ -70,7 +70,8 @@ int ask_plays(const Options& options) {
     backlash::arm::ArmRecord record = read_record(record_of(options, arm, folder, 0), declared.rig);
     for (backlash::record::Record& joint : record.joints)
       if (options.ask == "motors") joint.column(backlash::record::Channel::load_position).clear();
-    const backlash::findings::ArmPlayReport report = backlash::findings::arm_play_report(declared, record);
+    const backlash::arm_findings::ArmPlayReport report =
+        backlash::arm_findings::arm_play_report(declared, record);
     for (std::size_t j = 0; j < arm.joints.size(); ++j) {
       const Estimate& e = answer_of(report, j);
       const double truth = arm.joints[j].play;

@@ -325,9 +325,15 @@ TEST(EffectSearch, RefusesRecordsThatCannotTell) {
   record::Record standing = record;
   for (double& position : standing.column(record::Channel::load_position)) position = 0.1;
   EXPECT_THROW(trace_residual(rig, {standing}, unseen), CannotIdentify);
-  simulation::SimulationSettings faster = test::servo_run(11);
-  faster.sensors.sampling_rate = 2000;
-  EXPECT_THROW(trace_residual(rig, {record}, simulation::simulate_record(rig, faster, 3)), CannotIdentify);
+}
+
+TEST(EffectSearch, RecordsOfTwoRatesAreOfOneMachine) {
+  const model::Rig rig = test::servo_file().rig;
+  simulation::SimulationSettings faster = test::servo_run(12);
+  faster.sensors.sampling_rate *= 2;
+  const Trace trace = trace_residual(rig, {simulation::simulate_record(rig, test::servo_run(11), 3)},
+                                     simulation::simulate_record(rig, faster, 3));
+  EXPECT_EQ(trace.verdict, TraceVerdict::nothing_missing);
 }
 
 TEST(EffectSearch, CanBeStopped) {

@@ -126,5 +126,16 @@ TEST(Signature, TakesTheChannelOfWhichMostIsExplainable) {
   EXPECT_EQ(u->channel, "deflection");
 }
 
+// So few samples that no regression could say what it follows do say that it is three thousand times the
+// noise.
+TEST(Signature, AShortRecordLeavesTooMuchAsALongOneDoes) {
+  ChannelRemainder c = left_of_torque(0, 0, 0);
+  c.left.explainable = {}, c.left.follows.clear();
+  c.left.rms = 141, c.left.floor = 0.045;
+  const auto u = signature({c}, false, {});
+  ASSERT_TRUE(u);
+  EXPECT_NE(u->signature.find("too short"), std::string::npos) << u->signature;
+}
+
 }  // namespace
 }  // namespace backlash::identification

@@ -189,8 +189,27 @@ TEST(TracedRig, RefusesBeforehandWhatItCannotWrite) {
                          "    contact: {law: linear, stiffness: 460e3, damping: 483}\n");
   EXPECT_NE(contact, servo);
   EXPECT_NO_THROW(check_traced_rig_text(rig_file::rig_file_from_text(contact, "rig.yaml")));
-  const std::string terms = servo + "terms: [{id: gravity, amplitude: 1, phase: 0}]\n";
-  EXPECT_THROW(check_traced_rig_text(rig_file::rig_file_from_text(terms, "rig.yaml")), BadData);
+}
+
+// As people write it.
+TEST(TracedRig, TakesMapsAndListsInBrackets) {
+  std::string text =
+      config("two_inertia_servo") + "terms: [{id: gravity, amplitude: 1, phase: 0}]  # of the arm\n";
+  text = std::regex_replace(text, std::regex("    contact:.*\n(      .*\n)+"),
+                            "    contact: {law: linear, stiffness: 460e3, damping: 483}  # teeth\n");
+  text = std::regex_replace(text, std::regex("  motor:.*\n(    .*\n)+"),
+                            "  motor: {inertia: 6.3, viscous_damping: 13, coulomb_friction: 63}\n");
+  EXPECT_NE(text.find("  motor: {"), std::string::npos);
+  EXPECT_NE(text.find("contact: {"), std::string::npos);
+  const rig_file::RigFile file = round_trip(text, kServo, {gravity(), learned()});
+  EXPECT_NE(file.text.find("\n  - {id: gravity, amplitude: 1, phase: 0}\n"), std::string::npos) << file.text;
+
+  const rig_file::RigFile declared = rig_file::rig_file_from_text(text, "rig.yaml");
+  Trace trace = found(declared.rig, {"mesh_stiffness"}, {});
+  trace.augmented.mesh.contact =
+      model::make_contact_law("hunt_crossley", {{"stiffness", 2.1e7}, {"exponent", 1.5}, {"alpha", 0.8}});
+  const rig_file::RigFile hertz = rig_file::rig_file_from_text(traced_rig_text(declared, trace), "rig.yaml");
+  EXPECT_EQ(hertz.rig.mesh.contact_spec().values, trace.augmented.mesh.contact_spec().values);
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/identification/fit/fit_settings.h"
-#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
+#include "backlash_diagnosis/model/mesh_resonance.h"
 #include "support/one_inertia_bench.h"
 #include "support/servo.h"
 

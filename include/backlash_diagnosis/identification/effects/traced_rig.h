@@ -12,7 +12,7 @@ namespace backlash::identification {
 
 /// Fitted values are in the units of the file (of the motor shaft where it says motor_side: true), each with
 /// its standard error as comment; terms are always at the load side. Layout, other values, declared terms and
-/// comments stay. Throws BadData where the file writes a map that has to change, or its terms, on one line.
+/// comments stay. Throws BadData where a value that has to change is not where it can be.
 std::string traced_rig_text(const rig_file::RigFile& declared, const Trace& trace);
 
 /// Throws what traced_rig_text() would, before the long work.

@@ -6,6 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/record/even_grid.h"
 #include "backlash_diagnosis/record/record.h"
 
 namespace backlash::identification {
@@ -22,6 +23,7 @@ struct ServoData {
   std::vector<double> load, load_rate;         // rad, rad/s (low-passed)
   double load_rate_cutoff = 0;                 // Hz, of that low-pass
   double first_load = 0, first_load_rate = 0;  // rad, rad/s, from a line through the first samples
+  std::vector<bool> lost;  // of each sample: it was not recorded, and lies between its neighbours
   std::size_t size() const { return motor.size(); }
 };
 
@@ -47,6 +49,8 @@ double time_between_reversals(const ServoData& data);
 /// Needs motor_torque and motor_position; load_position where the record has it. Throws CannotIdentify
 /// without them, BadData for gaps or values that are not finite (naming channel and time).
 ServoData servo_data(const record::Record& record, const model::Rig& rig, double usual_torque = 0);
+/// Of one that is evenly sampled, with the rows that were lost.
+ServoData servo_data(const record::EvenGrid& record, const model::Rig& rig, double usual_torque = 0);
 
 /// Other columns of a machine whose load moves freely, with bands and noise as in `pattern`.
 ServoData with_columns(const ServoData& pattern, std::vector<double> torque, std::vector<double> motor,

@@ -22,6 +22,7 @@ namespace backlash::identification {
 struct OneInertiaOptions {
   double cutoff = 0;  // Hz; 0: the bandwidth of the motion (bandwidth.h), at least 100 periods in the record
   std::optional<double> delay;  // s, given; none: estimated within +-2 sampling intervals
+  std::vector<bool> lost = {};  // of each sample of an even record: it was not recorded; empty: all were
 };
 
 struct OneInertia {
@@ -52,7 +53,8 @@ OneInertia identify_one_inertia(const record::Record& record, const OneInertiaOp
 
 /// What a machine says of a record, by its own parameters, cutoff and delay: errors, and the samples that
 /// identify_one_inertia would use. Throws as that, but needs no second direction.
-OneInertia applied(const OneInertia& machine, const record::Record& record);
+OneInertia applied(const OneInertia& machine, const record::Record& record,
+                   const std::vector<bool>& lost = {});
 
 /// The machine of several records: of each parameter signal::weighted_mean(), with an error no smaller than
 /// the smallest of them where an effect that the equation lacks may draw all alike (more than 1.5 times the

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "backlash_diagnosis/record/time_base.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "check_parts.h"
+
+namespace backlash::record {
+namespace {
+
+constexpr double kMissing = 0.5;   // theory: of an interval, half of what one lost sample adds
+constexpr double kJitters = 0.01;  // choice: of an interval, standard deviation worth a look at the motion
+constexpr double kTells = 0.5;     // theory: one of the two readings leaves nothing where the other is wrong
+constexpr double kOnGrid = 0.5;    // theory: of an interval, beyond which a stamp is nearer to another row
+constexpr double kSteady = 0.2;    // choice: of the speed, by which it may change across a step of the clock
+constexpr double kClearMotion = 20;  // choice: steps of the sensor that a speed must pass to be one
+
+/// Samples missing between i and i + 1: a late sample is followed by a short interval, a lost one is not.
+std::size_t missing_after(const std::vector<double>& time, std::size_t i, double interval) {
+  const double own = (time[i + 1] - time[i]) / interval;
+  if (own < 1 + kMissing) return 0;
+  const std::size_t first = i > 0 ? i - 1 : i, last = std::min(i + 2, time.size() - 1);
+  const double around = (time[last] - time[first]) / interval - double(last - first);
+  return around < kMissing ? 0 : std::size_t(std::lround(std::min(own - 1, around)));
+}
+
+/// The clock jumped between i and i + 1 by more than the motion did: the speed before and after, which is the
+/// same, makes the way in one interval.
+bool is_clock_step(const RecordLook& look, std::size_t i) {
+  const std::vector<double>& t = look.record.time;
+  if (i < 3 || i + 4 >= t.size()) return false;
+  const double extra = t[i + 1] - t[i] - look.interval;
+  for (const Channel channel : kEncoders) {
+    const std::vector<double>& x = look.record.column(channel);
+    if (x.empty()) continue;
+    const double before = (x[i] - x[i - 3]) / (t[i] - t[i - 3]),
+                 after = (x[i + 4] - x[i + 1]) / (t[i + 4] - t[i + 1]), speed = 0.5 * (before + after);
+    const double smallest =
+        signal::smallest_step({x.begin() + std::ptrdiff_t(i) - 3, x.begin() + std::ptrdiff_t(i) + 5});
+    if (std::fabs(before - after) > kSteady * std::fabs(speed) ||
+        !(std::fabs(speed * extra) > kClearMotion * smallest))
+      continue;
+    if (std::fabs(x[i + 1] - x[i] - speed * look.interval) < kSteady * std::fabs(speed * extra)) return true;
+  }
+  return false;
+}
+
+struct Lost {
+  std::size_t samples = 0, places = 0, most = 0, most_after = 0, first = 0, last = 0;
+};
+
+std::string describe(const Lost& lost, const std::vector<double>& time) {
+  const std::string what = counted(lost.samples, "sample") + " missing ";
+  if (lost.places == 1)
+    return what + fmt::format("after {:.6g} s: estimates leave out what spans the place", time[lost.first]);
+  return what +
+         fmt::format(
+             "in {} places, the first after {:.6g} s, the most ({}) after {:.6g} s: estimates leave out "
+             "what spans a place",
+             lost.places, time[lost.first], lost.most, time[lost.most_after]);
+}
+
+/// Rows of an even grid that the samples stand on, counted from the first.
+std::vector<double> rows_of(const std::vector<double>& time, double interval) {
+  std::vector<double> rows(time.size(), 0);
+  for (std::size_t i = 0; i + 1 < time.size(); ++i)
+    rows[i + 1] = rows[i] + 1 + double(missing_after(time, i, interval));
+  return rows;
+}
+
+/// Which stamps the motion follows: on a straight line from neighbour to neighbour the position leaves less
+/// with the times at which it was sampled than with others.
+bool samples_are_even(const RecordLook& look) {
+  const std::vector<double>& t = look.record.time;
+  for (const Channel channel : kEncoders) {
+    const std::vector<double>& x = look.record.column(channel);
+    if (x.empty()) continue;
+    double by_stamps = 0, evenly = 0;
+    for (std::size_t i = 1; i + 1 < x.size(); ++i) {
+      if (t[i + 1] - t[i - 1] > (2 + kMissing) * look.interval) continue;
+      const double way = x[i + 1] - x[i - 1], share = (t[i] - t[i - 1]) / (t[i + 1] - t[i - 1]);
+      const double on_line = x[i] - x[i - 1];
+      by_stamps += std::pow(on_line - share * way, 2);
+      evenly += std::pow(on_line - 0.5 * way, 2);
+    }
+    return evenly < kTells * by_stamps;
+  }
+  return false;
+}
+
+void look_at_jitter(RecordLook& look) {
+  std::vector<double>& t = look.record.time;
+  double squares = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i + 1 < t.size(); ++i) {
+    if (missing_after(t, i, look.interval) > 0) continue;
+    squares += std::pow((t[i + 1] - t[i]) / look.interval - 1, 2);
+    ++count;
+  }
+  look.out.stamps.jitter = count > 0 ? std::sqrt(squares / double(count)) : 0;
+  if (look.out.stamps.jitter < kJitters || !samples_are_even(look)) return;
+  look.out.stamps.of_stamps_only = true;
+  if (look.declared.shares_stamps) return;
+  const std::vector<double> rows = rows_of(t, look.interval);
+  const double n = double(t.size()), mean_row = std::accumulate(rows.begin(), rows.end(), 0.0) / n,
+               mean_time = std::accumulate(t.begin(), t.end(), 0.0) / n;
+  double along = 0, square = 0, furthest = 0;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    along += (rows[i] - mean_row) * (t[i] - mean_time);
+    square += (rows[i] - mean_row) * (rows[i] - mean_row);
+  }
+  const double interval = along / square;
+  for (std::size_t i = 0; i < t.size(); ++i)
+    furthest = std::max(furthest, std::fabs(t[i] - mean_time - interval * (rows[i] - mean_row)));
+  if (furthest > kOnGrid * interval) return;  // a clock that drifts: stamps stay as they are
+  for (std::size_t i = 0; i < t.size(); ++i) t[i] = mean_time + interval * (rows[i] - mean_row);
+  look.out.stamps.evened = true;
+}
+
+}  // namespace
+
+std::string counted(std::size_t count, const std::string& noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
+void check_stamps(RecordLook& look) {
+  const std::vector<double>& time = look.record.time;
+  Lost lost;
+  for (std::size_t i = 0; i + 1 < time.size(); ++i) {
+    const std::size_t missing = missing_after(time, i, look.interval);
+    if (missing == 0) continue;
+    if (is_clock_step(look, i)) {
+      look.say(
+          FindingKind::clock_step, "time", time[i], time[i + 1], 1, Consequence::cut,
+          fmt::format(
+              "time: jumps by {:.4g} s after {:.6g} s while the positions go on by one sample: the clock "
+              "was set; used is what lies on one side",
+              time[i + 1] - time[i] - look.interval, time[i]));
+      look.cuts.push_back({time[i + 1], time[i + 1]});
+      continue;
+    }
+    if (lost.places == 0) lost.first = i;
+    lost.last = i;
+    ++lost.places;
+    lost.samples += missing;
+    if (missing > lost.most) lost.most = missing, lost.most_after = i;
+  }
+  look.out.stamps.interval = look.interval;
+  look.out.stamps.lost = lost.samples;
+  look.out.stamps.repeated = look.record.repeated_stamps;
+  if (lost.samples > 0)
+    look.say(FindingKind::lost_samples, "time", time[lost.first], time[lost.last + 1], lost.samples,
+             Consequence::noted, describe(lost, time));
+  if (look.record.repeated_stamps > 0)
+    look.say(FindingKind::repeated_stamps, "time", look.record.first_repeated_stamp,
+             look.record.first_repeated_stamp, look.record.repeated_stamps, Consequence::mended,
+             fmt::format("{} repeated, the first at {:.6g} s: the later samples are left out",
+                         counted(look.record.repeated_stamps, "stamp"), look.record.first_repeated_stamp));
+  look_at_jitter(look);
+}
+
+}  // namespace backlash::record

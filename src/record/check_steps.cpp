@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "check_parts.h"
+
+namespace backlash::record {
+namespace {
+
+// A machine needs many samples to gain and lose speed; a step leaves the speed on both sides as it was. With
+// the excess e[i] = x[i+1] - x[i] - interval (speed before + speed after) / 2, a step J gives -J/2, J, -J/2.
+constexpr double kShape = 0.3;  // choice: of J, by which its neighbours may differ from that
+constexpr double kStandsOut =
+    10;                        // choice: so many times what the other samples show; measured records: below 4
+constexpr double kRare = 500;  // choice: one of so many samples may be wrong
+constexpr std::size_t kFewest = 30;   // choice: of samples that are left out when the others are looked at
+constexpr double kSteps = 4;          // theory: steps of the sensor; rounding makes up to two
+constexpr std::size_t kSoon = 5;      // choice: samples in which a motion that goes on is seen
+constexpr std::size_t kShortest = 3;  // choice: samples that a wild value may last
+constexpr double kReturns = 0.2;      // choice: of the step, by which the way back may differ
+constexpr std::size_t kBeside =
+    16;  // choice: samples on either side, over which play and deflection are smooth
+constexpr std::size_t kSaidApart = 8;  // choice: jumps, of more only the number is said
+
+std::vector<double> excess_of(const std::vector<double>& time, const std::vector<double>& x) {
+  std::vector<double> excess(x.size(), 0.0);
+  for (std::size_t i = 1; i + 2 < x.size(); ++i) {
+    const double span = time[i + 1] - time[i], before = (x[i] - x[i - 1]) / (time[i] - time[i - 1]),
+                 after = (x[i + 2] - x[i + 1]) / (time[i + 2] - time[i + 1]);
+    excess[i] = x[i + 1] - x[i] - 0.5 * span * (before + after);
+  }
+  return excess;
+}
+
+/// What an acceleration makes over an interval grows with its square.
+double longer(const RecordLook& look, std::size_t i) {
+  const double times = std::max(1.0, (look.record.time[i + 1] - look.record.time[i]) / look.interval);
+  return times * times;
+}
+
+double usual_size(const std::vector<double>& excess) {
+  std::vector<double> sizes;
+  sizes.reserve(excess.size());
+  for (const double e : excess) sizes.push_back(std::fabs(e));
+  const std::size_t leave = std::max(kFewest, std::size_t(double(sizes.size()) / kRare));
+  const auto place = sizes.end() - std::ptrdiff_t(std::min(leave, sizes.size() - 1)) - 1;
+  std::nth_element(sizes.begin(), place, sizes.end());
+  return *place;
+}
+
+bool has_shape(const std::vector<double>& e, std::size_t i) {
+  return i > 0 && i + 1 < e.size() && std::fabs(e[i - 1] + 0.5 * e[i]) < kShape * std::fabs(e[i]) &&
+         std::fabs(e[i + 1] + 0.5 * e[i]) < kShape * std::fabs(e[i]);
+}
+
+/// Values that are wild for up to kShortest samples from i + 1 on: the last of them, else i. The position
+/// goes on behind them as it went before.
+std::size_t end_of_wild(const std::vector<double>& x, const std::vector<double>& t, std::size_t i,
+                        double least) {
+  const double speed = (x[i] - x[i - 1]) / (t[i] - t[i - 1]);
+  const auto off = [&](std::size_t k) { return x[k] - x[i] - speed * (t[k] - t[i]); };
+  for (std::size_t end = i + 1; end <= i + kShortest && end + 1 < x.size(); ++end) {
+    if (std::fabs(off(end)) < least) return i;
+    if (std::fabs(off(end + 1)) < kReturns * std::fabs(off(end))) return end;
+  }
+  return i;
+}
+
+/// Of a jump between i and i + 1: how the two positions lie to each other, a step in a parabola; else the
+/// excess.
+signal::Measured size_of(const RecordLook& look, Channel channel, std::size_t i, signal::Measured excess) {
+  const bool of_motor = channel == Channel::motor_position;
+  const std::vector<double>&x = look.record.column(channel), &t = look.record.time,
+        &other = look.record.column(of_motor ? Channel::load_position : Channel::motor_position);
+  if (other.empty() || !all_finite(other) || i + 1 < kBeside || i + 1 + kBeside > x.size()) return excess;
+  const double ratio = of_motor ? look.declared.axis_ratio : 1 / look.declared.axis_ratio;
+  Eigen::MatrixXd a(2 * kBeside, 4);
+  Eigen::VectorXd b(2 * kBeside);
+  for (std::size_t k = 0; k < 2 * kBeside; ++k) {
+    const std::size_t at = i + 1 + k - kBeside;
+    const double since = (t[at] - t[i]) / (double(kBeside) * look.interval);
+    a.row(Eigen::Index(k)) << (at > i ? 1 : 0), 1, since, since * since;
+    b[Eigen::Index(k)] = x[at] - ratio * other[at];
+  }
+  const signal::Measured size = signal::fit_linear(a, b).parameter(0);
+  return std::fabs(size.value - excess.value) < kShape * std::fabs(excess.value) ? size : excess;
+}
+
+void say_jumps(RecordLook& look, const std::vector<Jump>& jumps) {
+  if (jumps.empty()) return;
+  const std::string& name = channel_name(jumps.front().channel);
+  if (jumps.size() > kSaidApart) {
+    look.say(
+        FindingKind::jump, name, jumps.front().before, jumps.back().after, jumps.size(), Consequence::cut,
+        fmt::format(
+            "{}: jumps {} times within one sample, the first by {:.4g} after {:.6g} s: a zero that moves, or "
+            "counts that are lost; used is what lies between two jumps",
+            name, jumps.size(), jumps.front().size.value, jumps.front().before));
+    return;
+  }
+  for (const Jump& jump : jumps)
+    look.say(
+        FindingKind::jump, name, jump.before, jump.after, 1, Consequence::cut,
+        fmt::format(
+            "{}: jumps by {:.4g} within one sample after {:.6g} s, faster than all else in the record moves: "
+            "a zero that moved, a clutch that slipped or counts that were lost; no estimate reaches across",
+            name, jump.size.value, jump.before));
+}
+
+/// The line between the samples to either side.
+void bridge(std::vector<double>& x, const std::vector<double>& time, std::size_t before, std::size_t after) {
+  for (std::size_t i = before + 1; i < after; ++i)
+    x[i] = x[before] + (x[after] - x[before]) * (time[i] - time[before]) / (time[after] - time[before]);
+}
+
+struct Wild {
+  std::size_t samples = 0, first = 0;
+};
+
+/// The value before a jump repeats for long, and behind it the position goes on at once: it moved all the
+/// while. Where it begins to repeat, else i.
+std::size_t begin_of_frozen(const std::vector<double>& x, std::size_t i, double quantum) {
+  std::size_t begin = i;
+  while (begin > 0 && x[begin - 1] == x[i]) --begin;
+  const std::size_t later = std::min(i + 1 + kSoon, x.size() - 1);
+  const bool goes_on = std::fabs(x[later] - x[i + 1]) > kSteps * quantum;
+  return i + 1 - begin >= kLongRun && goes_on ? begin : i;
+}
+
+/// Takes single wild samples out, returns the jumps that are left.
+std::vector<Jump> look_at(RecordLook& look, Channel channel, Wild& wild) {
+  std::vector<double>& x = look.record.column(channel);
+  const std::vector<double>& t = look.record.time;
+  const std::vector<double> excess = excess_of(t, x);
+  const double usual = std::max(usual_size(excess), signal::smallest_step(x));
+  const double least = std::max(kStandsOut * usual_size(excess), kSteps * signal::smallest_step(x));
+  std::vector<Jump> jumps;
+  for (std::size_t i = 1; i + 2 < x.size(); ++i) {
+    if (std::fabs(excess[i]) < least * longer(look, i)) continue;
+    if (const std::size_t end = end_of_wild(x, t, i, least); end > i) {
+      if (wild.samples == 0) wild.first = i + 1;
+      wild.samples += end - i;
+      bridge(x, t, i, end + 1);
+      i = end + 1;
+    } else if (!has_shape(excess, i)) {
+      continue;
+    } else if (const std::size_t begin = begin_of_frozen(x, i, signal::smallest_step(x)); begin < i) {
+      cut_frozen(look, channel, begin, i + 1, fmt::format("and then jumps on by {:.4g}", excess[i]));
+    } else {
+      jumps.push_back({channel, t[i], t[i + 1], size_of(look, channel, i, {excess[i], usual})});
+    }
+  }
+  return jumps;
+}
+
+}  // namespace
+
+void check_steps(RecordLook& look) {
+  for (const Channel channel : kEncoders) {
+    if (look.record.column(channel).empty() || !all_finite(look.record.column(channel))) continue;
+    Wild wild;
+    const std::vector<Jump> jumps = look_at(look, channel, wild);
+    say_jumps(look, jumps);
+    for (const Jump& jump : jumps) look.cuts.push_back({jump.after, jump.after});
+    look.out.jumps.insert(look.out.jumps.end(), jumps.begin(), jumps.end());
+    if (wild.samples == 0) continue;
+    const std::string& name = channel_name(channel);
+    const double first = look.record.time[wild.first];
+    look.say(FindingKind::jump, name, first, first, wild.samples, Consequence::mended,
+             fmt::format(
+                 "{}: {} off by far and back at once, the first at {:.6g} s: in their place stands the line "
+                 "between their neighbours",
+                 name, counted(wild.samples, "sample"), first));
+  }
+}
+
+}  // namespace backlash::record

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tools/arm/arm_commands.h"
+
+#include <map>
+
+#include "tools/common/for_arm.h"
+
+namespace backlash::tools {
+
+extern "C" int backlash_run_for_arm(const Arguments& arguments, RecordDoor& door) {
+  static const std::map<std::string, int (*)(const Arguments&, RecordDoor&)> commands = {
+      {"simulate", [](const Arguments& a, RecordDoor&) { return simulate_arm(a); }},
+      {"check_record", [](const Arguments& a, RecordDoor&) { return check_arm(a); }},
+      {"diagnose_record", diagnose_arm},
+      {"identify", identify_arm},
+      {"trace_residual", trace_arm_residual},
+  };
+  return commands.at(door.command())(arguments, door);
+}
+
+}  // namespace backlash::tools

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tools/common/record_door.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
+
+namespace backlash::tools {
+namespace {
+
+constexpr double kWorthwhile = 0.5;  // choice: of the longest stretch; shorter ones tell little beside it
+
+void refuse_if(const report::CheckedFile& file) {
+  for (const record::Finding& finding : file.findings())
+    if (finding.consequence == record::Consequence::refused) throw BadData(file.path, finding.message);
+}
+
+/// What a cut leaves is said beside whatever comes out of it.
+record::Record part_of(record::Record record, const record::Stretch& stretch,
+                       const std::vector<std::string>& why) {
+  record = std::move(record).slice(stretch.from, stretch.to);
+  if (record.size() == 0) return record;
+  for (const std::string& reason : why) record.warnings.push_back(reason);
+  record.warnings.push_back(
+      fmt::format("used from {:.6g} to {:.6g} s", record.time.front(), record.time.back()));
+  return record;
+}
+
+std::vector<std::string> cuts_of(const report::CheckedFile& file) {
+  std::vector<std::string> why;
+  for (const record::Finding& finding : file.findings())
+    if (finding.consequence == record::Consequence::cut) why.push_back(finding.message);
+  return why;
+}
+
+/// The longest time in which no joint is cut.
+record::Stretch longest_of_all(const report::CheckedFile& file) {
+  std::vector<record::Stretch> common = file.joints.front().check.usable;
+  for (const report::CheckedFile::Joint& joint : file.joints) {
+    std::vector<record::Stretch> both;
+    for (const record::Stretch& a : common)
+      for (const record::Stretch& b : joint.check.usable)
+        if (std::max(a.from, b.from) < std::min(a.to, b.to))
+          both.push_back({std::max(a.from, b.from), std::min(a.to, b.to)});
+    common = both;
+  }
+  record::RecordCheck all;
+  all.usable = common;
+  return record::longest_stretch(all);
+}
+
+/// Jumps are what is looked for, and a step of the clock is a rest; a channel that stands still would be a
+/// change of anything.
+void refuse_frozen(const report::CheckedFile& file) {
+  for (const record::Finding& finding : file.findings())
+    if (finding.kind == record::FindingKind::frozen) throw CannotIdentify(file.path + ": " + finding.message);
+}
+
+}  // namespace
+
+report::CheckedFile checked_joints(std::vector<record::JointRecord>& joints, const std::string& path) {
+  report::CheckedFile file{path, {}};
+  record::DeclaredMotion declared;
+  declared.shares_stamps = joints.size() > 1;
+  for (record::JointRecord& joint : joints) {
+    record::CheckedRecord checked = record::check_record(std::move(joint.record), declared);
+    joint.record = std::move(checked.record);
+    file.joints.push_back({joint.joint, std::move(checked.check)});
+  }
+  return file;
+}
+
+void RecordDoor::say(const report::CheckedFile& file) const {
+  for (const record::Finding& finding : file.findings())
+    std::cerr << command_ << ": " << printable(file.path, 4096) << ": " << finding.message << '\n';
+}
+
+record::CheckedRecord RecordDoor::look(record::Record record, const record::DeclaredMotion& declared,
+                                       const std::string& path) {
+  record::CheckedRecord checked = record::check_record(std::move(record), declared);
+  files_.push_back({path, {{"", checked.check}}});
+  refuse_if(files_.back());
+  say(files_.back());
+  return checked;
+}
+
+record::Record RecordDoor::admit(record::Record record, const record::DeclaredMotion& declared,
+                                 const std::string& path) {
+  record::CheckedRecord checked = look(std::move(record), declared, path);
+  const std::vector<std::string> why = cuts_of(files_.back());
+  if (why.empty()) return std::move(checked.record);
+  return part_of(std::move(checked.record), record::longest_stretch(checked.check), why);
+}
+
+std::vector<record::Record> RecordDoor::admit_stretches(record::Record record,
+                                                        const record::DeclaredMotion& declared,
+                                                        const std::string& path) {
+  const record::CheckedRecord checked = look(std::move(record), declared, path);
+  const std::vector<std::string> why = cuts_of(files_.back());
+  if (why.empty()) return {checked.record};
+  const double least = kWorthwhile * record::longest_stretch(checked.check).duration();
+  std::vector<record::Record> parts;
+  for (const record::Stretch& stretch : checked.check.usable) {
+    if (stretch.duration() < least) continue;
+    parts.push_back(part_of(checked.record, stretch, parts.empty() ? why : std::vector<std::string>()));
+    parts.back().name += fmt::format(" from {:.6g} s", stretch.from);
+  }
+  return parts;
+}
+
+record::Record RecordDoor::admit_with_jumps(record::Record record, const record::DeclaredMotion& declared,
+                                            const std::string& path, std::vector<JointJump>& jumps) {
+  record::CheckedRecord checked = look(std::move(record), declared, path);
+  refuse_frozen(files_.back());
+  for (const record::Jump& jump : checked.check.jumps) jumps.push_back({"", jump});
+  return record::without_jumps(std::move(checked.record), checked.check.jumps);
+}
+
+std::vector<record::JointRecord> RecordDoor::look(std::vector<record::JointRecord> joints,
+                                                  const std::string& path) {
+  files_.push_back(checked_joints(joints, path));
+  refuse_if(files_.back());
+  say(files_.back());
+  return joints;
+}
+
+std::vector<record::JointRecord> RecordDoor::admit(std::vector<record::JointRecord> joints,
+                                                   const std::string& path) {
+  joints = look(std::move(joints), path);
+  const std::vector<std::string> why = cuts_of(files_.back());
+  if (why.empty()) return joints;
+  const record::Stretch longest = longest_of_all(files_.back());
+  for (record::JointRecord& joint : joints)
+    joint.record = part_of(std::move(joint.record), longest,
+                           &joint == &joints.front() ? why : std::vector<std::string>());
+  return joints;
+}
+
+std::vector<record::JointRecord> RecordDoor::admit_with_jumps(std::vector<record::JointRecord> joints,
+                                                              const std::string& path,
+                                                              std::vector<JointJump>& jumps) {
+  joints = look(std::move(joints), path);
+  refuse_frozen(files_.back());
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const std::vector<record::Jump>& found = files_.back().joints[j].check.jumps;
+    joints[j].record = record::without_jumps(std::move(joints[j].record), found);
+    for (const record::Jump& jump : found) jumps.push_back({joints[j].joint, jump});
+  }
+  return joints;
+}
+
+}  // namespace backlash::tools
