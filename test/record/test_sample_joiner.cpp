@@ -123,6 +123,21 @@ TEST(SampleJoiner, JoinsRecordsAndSaysWhatItLeftOut) {
   EXPECT_THROW(joined({motor_part, later}), BadData);
 }
 
+// A stretch that is cut out of all joints by the times of one must lie where that one has it.
+TEST(SampleJoiner, AnotherTimeZeroMovesNoSample) {
+  Record late;
+  late.origin = 1003.5;
+  late.time = {0, 0.25, 0.5};
+  late.column(Channel::motor_position) = {1, 2, 3};
+  late.repeated_stamps = 1;
+  late.first_repeated_stamp = 0.25;
+  set_origin(late, 1002);
+  EXPECT_EQ(late.time, (std::vector<double>{1.5, 1.75, 2}));
+  EXPECT_EQ(late.first_repeated_stamp, 1.75);
+  EXPECT_EQ(late.origin, 1002);
+  EXPECT_EQ(late.slice(1.75, 2).column(Channel::motor_position), std::vector<double>{2});
+}
+
 // Two controllers of an arm, each with a time zero and stamps of its own: q = t and 2 t of one clock.
 TEST(SampleJoiner, JointsOfTwoControllersGetOneTimeBase) {
   std::vector<Record> joints(2);
