@@ -43,7 +43,7 @@ constexpr int kFewestPressed = 5;  // windows, for each flank
 constexpr double kPressed = 0.1;   // of the usual torque, in one of them
 constexpr double kLong = 0.1;      // of its samples
 constexpr double kFar = 4;         // spreads of a declared value
-constexpr double kLeft = 0.2;      // of the deflection or the torque, that is not explained
+constexpr double kLeft = 0.35;     // of the deflection or the torque, that is not explained
 constexpr double kVague = 4;       // upper over lower end of an interval, by which it says too little
 // The interval.
 constexpr double kRivalCost = 9;  // theory: three standard errors
@@ -232,10 +232,10 @@ void require_declared(const TraverseFit& fit) {
                                 fit.windows->shared()[std::size_t(k)].name, fit.fit.value(k))};
 }
 
-/// Share of what the machine should explain that is left: of the deflection where the load is seen, else of
-/// the torque.
+/// Share of what the machine should explain that is left beyond noise: of the deflection where the load is
+/// seen, else of the torque.
 double left_of(const TraverseFit& fit, const TraverseData& data) {
-  const double times = fit.misfit();
+  const double times = std::sqrt(std::max(0.0, std::pow(fit.misfit(), 2) - 1));
   return data.load.empty() ? times * data.torque_noise / data.level : times * data.load_noise / data.width;
 }
 
@@ -281,7 +281,7 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
   double lower = gap, upper = gap;
   for (const TraverseFit& fit : fits) {
     const double half = std::hypot(signal::student_t_quantile(0.975, windows - 1) * Errors(fit).larger(),
-                                   data.load.empty() ? kModel : kModelByLoad);
+                                   data.load.empty() ? kModel : kModelByLoad, left);
     if (!(std::exp(2 * half) < kVague))
       throw Refusal{
           Status::insufficient_data,
@@ -292,8 +292,17 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
     lower = std::min(lower, fit.gap() - std::hypot(fit.gap() * (1 - std::exp(-half)), law));
     upper = std::max(upper, fit.gap() + std::hypot(fit.gap() * (std::exp(half) - 1), law));
   }
+  // Without a gap teeth are a spring, of which nobody sees the torque at rest: one flank may be pressed
+  // throughout as well.
+  if (!(lower > 0))
+    throw Refusal{
+        Status::below_range,
+        fmt::format(
+            "no gap is seen: less than {:.2g} rad, or a torque on the load that the rig file does not "
+            "declare (gravity) keeps one flank pressed",
+            upper)};
   e.status = Status::ok;
-  e.backlash_angle = gap, e.angle_lower = std::max(0.0, lower), e.angle_upper = upper;
+  e.backlash_angle = gap, e.angle_lower = lower, e.angle_upper = upper;
   e.backlash = gap * s.base_radius, e.lower = e.angle_lower * s.base_radius;
   e.upper = e.angle_upper * s.base_radius;
   e.message = fmt::format("{}, {} windows of the record; {:.2g} % of the {} are not explained",

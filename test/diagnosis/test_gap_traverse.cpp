@@ -109,7 +109,7 @@ TEST(GapTraverse, LostSamplesAreMissingRows) {
 
 // The load's encoder is set at any angle, eccentric and late; the torque is not asked for.
 TEST(GapTraverse, TellsThePlayFromBothEncoders) {
-  for (const double gap : {1.5e-4, 5e-4, 1.5e-3})
+  for (const double gap : {3e-4, 5e-4, 1.5e-3})
     for (const double eccentricity : {0.0, 2e-4}) {
       Servo servo;
       servo.gap = gap, servo.load_step = 7e-6, servo.eccentricity = eccentricity, servo.skew = eccentricity;
@@ -138,9 +138,12 @@ TEST(GapTraverse, HoldsForTeethAfterHertzWithBothEncoders) {
 // One flank is pressed throughout: its deflection says nothing of the other.
 TEST(GapTraverse, OneFlankAloneIsNoPlay) {
   Servo servo;
-  servo.gravity = 1500, servo.load_step = 7e-6;
-  const Estimate e = estimate_gap_traverse(servo.record(), declared());
-  EXPECT_NE(e.status, Status::ok) << e.backlash_angle << " " << e.message;
+  servo.load_step = 7e-6;
+  for (const double gravity : {600.0, 1500.0}) {
+    servo.gravity = gravity;
+    const Estimate e = estimate_gap_traverse(servo.record(), declared());
+    EXPECT_NE(e.status, Status::ok) << e.backlash_angle << " " << e.message;
+  }
 }
 
 TEST(GapTraverse, HoldsWithEffectsThatNobodyDeclares) {
