@@ -42,9 +42,11 @@ constexpr double kFewOf = 0.35;    // of all crossings: simulation, see require_
 constexpr int kFewestPressed = 5;  // windows, for each flank
 constexpr double kPressed = 0.1;   // of the usual torque, in one of them
 constexpr double kLong = 0.1;      // of its samples
-constexpr double kFar = 4;         // spreads of a declared value
-constexpr double kLeft = 0.35;     // of the deflection or the torque, that is not explained
-constexpr double kVague = 4;       // upper over lower end of an interval, by which it says too little
+constexpr double kMoved =
+    1e-3;                   // spreads: a fit that moves no value of the machine at all found nowhere to go
+constexpr double kFar = 4;  // spreads of a declared value
+constexpr double kLeft = 0.35;  // of the deflection or the torque, that is not explained
+constexpr double kVague = 4;    // upper over lower end of an interval, by which it says too little
 // The interval.
 constexpr double kRivalCost = 9;  // theory: three standard errors
 constexpr double kLaw =
@@ -225,6 +227,10 @@ double deflection(const TraverseFit& fit, const TraverseData& data) {
 
 /// What the record is explained by must be a machine like the declared one.
 void require_declared(const TraverseFit& fit) {
+  if (fit.fit.shared.tail(kTraverseValues - 1).cwiseAbs().maxCoeff() < kMoved)  // the gap comes first
+    throw Refusal{Status::out_of_domain,
+                  "the load's motion in the gap cannot be followed: it bounces from flank to flank "
+                  "faster than the declared machine; slower moves would do"};
   for (const int k : {kTraverseStiffness, kTraverseLoadInertia, kTraverseMotorInertia})
     if (std::fabs(fit.fit.shared[k]) > kFar)
       throw Refusal{Status::out_of_domain,

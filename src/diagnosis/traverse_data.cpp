@@ -34,9 +34,10 @@ constexpr std::size_t kFewestSamples = 256;
 constexpr double kEnd = 0.02;       // share of the samples at either end of a range, of which outliers may be
 constexpr double kShown = 5e-5;     // rad, of an encoder, beside its eccentricity: 10 seconds of arc
 constexpr double kUntracked = 0.1;  // of the usual torque, on the load
-constexpr double kTile = 6;         // cycles, of a window with the load's encoder
-constexpr std::size_t kFewestTile = 48;  // samples, of it
-constexpr std::size_t kFirst = 3;        // samples, that differences and delays need
+constexpr double kRough = 0.1, kFaster = 4;  // of the range; times the rate, that would show more
+constexpr double kTile = 6;                  // cycles, of a window with the load's encoder
+constexpr std::size_t kFewestTile = 48;      // samples, of it
+constexpr std::size_t kFirst = 3;            // samples, that differences and delays need
 
 /// Value and slope per sample of a quadratic over `reach` samples to each side (Savitzky and Golay 1964).
 struct Quadratic {
@@ -253,6 +254,17 @@ void read_load(TraverseData& d, const record::EvenGrid& even, const GapTraverseS
   const double low = signal::quantile(apart, kEnd), high = signal::quantile(apart, 1 - kEnd);
   const double middle = 0.5 * (low + high);
   d.width = high - low;
+  // From every other sample the ones between follow by a cubic, where the motion is resolved.
+  std::vector<double> left;
+  for (std::size_t i = 3; i + 3 < n; ++i)
+    left.push_back(
+        std::fabs(apart[i] - (9 * (apart[i - 1] + apart[i + 1]) - apart[i - 3] - apart[i + 3]) / 16));
+  if (const double rough = signal::median(left); rough > kRough * d.width)
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("motor minus load position changes from sample to sample, half of the time by "
+                              "more than {:.2g} rad "
+                              "of a range of {:.2g}: a rate of {:.0f} Hz and more would show how",
+                              rough, d.width, kFaster / d.interval)};
   for (double& q : d.load) q += middle;
   d.load_counts.assign(n, 0);
   for (std::size_t i = 0; i < n; ++i) d.load_counts[i] = !even.lost[i];
