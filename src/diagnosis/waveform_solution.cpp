@@ -215,6 +215,10 @@ class Solver {
     const double period = 2.0 * (data_.windows[1].first - data_.windows[0].first);
     std::vector<double> values = channel == kTorqueChannel ? data_.torque : data_.position;
     const double noise = signal::estimate_noise(values, period).upper;
+    std::size_t recorded = 0;  // what is interpolated lies anywhere between two steps
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (!data_.lost[i]) values[recorded++] = values[i];
+    values.resize(recorded);
     std::sort(values.begin(), values.end());
     double step = std::numeric_limits<double>::infinity();
     for (std::size_t i = 1; i < values.size(); ++i)
