@@ -30,8 +30,10 @@ constexpr int kSearch = 20;      // steps of one
 constexpr double kGuesses[] = {0.3, 0.55, 1, 1.8, 3.3};  // times the declared gap
 constexpr double kShares[] = {0.3, 0.5, 0.7, 0.85, 1};   // of the range of motor minus load position
 constexpr double kBeside[] = {0.7, 1.4};                 // times the gap of a fit, from which others begin
+constexpr std::size_t kNearer = 3;                       // guesses that are looked at with less noise
 constexpr std::size_t kGoneOn = 2;                       // guesses that go on, the cheapest that differ
 constexpr double kFirstNoise = 0.05;                     // of the width, of what is left at first
+constexpr double kOtherNoise = 0.1;                      // by which the noise must differ for another fit
 constexpr double kAlike = 0.2;                           // of the play, between fits that are the same
 constexpr double kUnsureFriction = 0.5;  // of the declared dry friction of the motor, as the fit has it
 constexpr double kUnsureTorque = 2;      // theory: 95 % of what nothing explains
@@ -140,7 +142,22 @@ bool alike(const TraverseFit& a, const TraverseFit& b) {
 
 using Fits = std::vector<TraverseFit>;
 
-/// Fits from these gaps [rad], side by side, cheapest first, without those that came to the same.
+/// Some steps of each, side by side. Returns them cheapest first, without those that came to the same.
+Fits run_some(Fits fits) {
+  fit::FitOptions options;
+  options.iterations = kSearch;
+  for_each_in_parallel(int(fits.size()), [&](int i) { fits[std::size_t(i)].fit.run(options); });
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const auto& a, const auto& b) { return a.fit.cost() < b.fit.cost(); });
+  Fits kept;
+  for (TraverseFit& fit : fits)
+    if (std::isfinite(fit.fit.cost()) &&
+        std::none_of(kept.begin(), kept.end(), [&](const auto& other) { return alike(fit, other); }))
+      kept.push_back(std::move(fit));
+  return kept;
+}
+
+/// Fits from these gaps [rad].
 Fits searched(const TraverseData& data, const GapTraverseSettings& settings,
               const std::vector<TraverseWindow>& windows, const Eigen::VectorXd& from,
               const std::vector<double>& gaps, double noise) {
@@ -150,26 +167,17 @@ Fits searched(const TraverseData& data, const GapTraverseSettings& settings,
     const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
     fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
   }
-  fit::FitOptions options;
-  options.iterations = kSearch;
-  const auto run = [&] {
-    for_each_in_parallel(int(fits.size()), [&](int i) { fits[std::size_t(i)].fit.run(options); });
-  };
-  run();
-  // From afar with a noise in which all of them see where to go, then with what the best leaves.
-  if (!data.load.empty()) {
-    for (const TraverseFit& fit : fits) noise = std::min(noise, fit.noise_left());
-    for (TraverseFit& fit : fits) fit.windows->noise = std::max(1.0, noise);
-    run();
-  }
-  std::stable_sort(fits.begin(), fits.end(),
-                   [](const auto& a, const auto& b) { return a.fit.cost() < b.fit.cost(); });
-  Fits kept;
-  for (TraverseFit& fit : fits)
-    if (std::isfinite(fit.fit.cost()) &&
-        std::none_of(kept.begin(), kept.end(), [&](const auto& other) { return alike(fit, other); }))
-      kept.push_back(std::move(fit));
-  return kept;
+  return run_some(std::move(fits));
+}
+
+/// The cheapest of those that have begun from afar, with a noise in which all of them saw where to go: on
+/// with what the best leaves.
+Fits nearer(Fits fits) {
+  while (fits.size() > kNearer) fits.pop_back();
+  double noise = std::numeric_limits<double>::infinity();
+  for (const TraverseFit& fit : fits) noise = std::min(noise, fit.noise_left());
+  for (TraverseFit& fit : fits) fit.windows->noise = std::max(1.0, noise);
+  return run_some(std::move(fits));
 }
 
 /// Another fit's machine on these windows.
@@ -198,14 +206,18 @@ struct Errors {
 Fits solve(TraverseData& data, const GapTraverseSettings& settings,
            const std::vector<TraverseWindow>& windows, const Fits& guesses) {
   const std::vector<TraverseWindow> all = some(windows, kMost), few = some(windows, kSearched);
-  TraverseFit first = gone_on(data, settings, all, guesses[0], guesses[0].noise());
-  const double noise = data.load.empty() ? std::max(1.0, first.noise_left()) : first.noise_left();
-  if (!data.load.empty()) {
-    data.shown_spread = std::max(2 * data.load_noise, first.rms_of_own(kOwnShown));
-    data.load_torque_spread = std::max(data.load_torque_spread, first.rms_of_own(kOwnLoadTorque));
-  }
   Fits fits;
-  fits.push_back(gone_on(data, settings, all, first, noise));
+  fits.push_back(gone_on(data, settings, all, guesses[0], guesses[0].noise()));
+  double noise = fits[0].noise_left();
+  if (data.load.empty()) noise = std::max(1.0, noise);
+  if (std::fabs(noise / fits[0].noise() - 1) > kOtherNoise) {  // once more, with what it has shown of itself
+    if (!data.load.empty()) {
+      data.shown_spread = std::max(2 * data.load_noise, fits[0].rms_of_own(kOwnShown));
+      data.load_torque_spread = std::max(data.load_torque_spread, fits[0].rms_of_own(kOwnLoadTorque));
+    }
+    fits[0] = gone_on(data, settings, all, fits[0], noise);
+  }
+  noise = fits[0].noise();
   // A fit stops where it is cheapest nearby.
   std::vector<double> beside;
   for (const double factor : kBeside) beside.push_back(factor * fits[0].gap());
@@ -327,8 +339,8 @@ void by_load(Estimate& e, const record::Record& record, const GapTraverseSetting
   for (const TraverseWindow& window : some(narrow, kMost - int(chosen.size()))) chosen.push_back(window);
   std::vector<double> starts;
   for (const double share : kShares) starts.push_back(share * data.width);
-  const Fits guesses = searched(data, s, some(wide, kSearched), Eigen::VectorXd::Zero(kTraverseValues),
-                                starts, kFirstNoise * data.width / data.load_noise);
+  const Fits guesses = nearer(searched(data, s, some(wide, kSearched), Eigen::VectorXd::Zero(kTraverseValues),
+                                       starts, kFirstNoise * data.width / data.load_noise));
   if (guesses.empty())
     throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
   fill(e, solve(data, s, chosen, guesses), data, s);

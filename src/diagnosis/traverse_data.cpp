@@ -267,6 +267,7 @@ void read_load(TraverseData& d, const record::EvenGrid& even, const GapTraverseS
                               rough, d.width, kFaster / d.interval)};
   for (double& q : d.load) q += middle;
   d.load_counts.assign(n, 0);
+  for (const double q : d.position) d.sine.push_back(std::sin(q)), d.cosine.push_back(std::cos(q));
   for (std::size_t i = 0; i < n; ++i) d.load_counts[i] = !even.lost[i];
   d.load_noise =
       std::max(signal::noise_from_differences(d.load, 4), signal::smallest_step(d.load) / std::sqrt(12.0));

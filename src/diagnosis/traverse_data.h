@@ -40,6 +40,7 @@ struct TraverseData {
   // Of the load's encoder, if there is one: rad, about the motor's position; whether it was read
   std::vector<double> load;
   std::vector<char> load_counts;
+  std::vector<double> sine, cosine;            // of the position, for an eccentric disk
   double load_noise = 0, load_rate_noise = 0;  // rad, rad/s, white
   double shown_spread = 0;                     // rad, of the encoders' errors from window to window
   double load_torque_spread = 0;               // N m, of what nothing explains from window to window

@@ -9,9 +9,8 @@
 
 namespace backlash::diagnosis {
 double shown_too_much(const TraverseData& data, const TraverseRun& run, std::size_t sample) {
-  const double angle = data.position[sample];
-  return run.own[kOwnShown] + run.machine[kTraverseZero] + run.machine[kTraverseSine] * std::sin(angle) +
-         run.machine[kTraverseCosine] * std::cos(angle);
+  return run.own[kOwnShown] + run.machine[kTraverseZero] + run.machine[kTraverseSine] * data.sine[sample] +
+         run.machine[kTraverseCosine] * data.cosine[sample];
 }
 
 namespace {

@@ -171,6 +171,8 @@ TEST(TraverseWindows, ColumnsAreThoseOfEachAlone) {
     data.shown_spread = 5e-5;
     if (by_load) {
       data.load = data.position, data.load_counts.assign(data.load.size(), 1);
+      for (const double q : data.position)
+        data.sine.push_back(std::sin(q)), data.cosine.push_back(std::cos(q));
       for (TraverseWindow& w : data.windows)
         w.load = data.position[w.first], w.load_rate = data.rate[w.first];
     }
