@@ -15,6 +15,7 @@
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
+#include "traverse_waves.h"
 #include "traverse_windows.h"
 
 namespace backlash::diagnosis {
@@ -37,8 +38,6 @@ constexpr double kOtherNoise = 0.1;                      // by which the noise m
 constexpr double kAlike = 0.2;                           // of the play, between fits that are the same
 constexpr double kUnsureFriction = 0.5;  // of the declared dry friction of the motor, as the fit has it
 constexpr double kUnsureTorque = 2;      // theory: 95 % of what nothing explains
-constexpr int kMostOrders = 48;          // per turn of the motor: poles and slots of servo motors
-constexpr double kWaveSeen = 5;          // times what white noise shows; what is left is not white
 // The gates.
 constexpr double kFewOf = 0.35;    // of all crossings: simulation, see require_most()
 constexpr int kFewestPressed = 5;  // windows, for each flank
@@ -202,6 +201,20 @@ struct Errors {
   double scale() const { return std::pow(std::max(1.0, clustered / of_fit), 2); }
 };
 
+/// Adds those of either half of the record, where they are sure of another play: one that steps or grows.
+void add_halves(Fits& fits, const TraverseData& data, const GapTraverseSettings& settings,
+                std::vector<TraverseWindow> windows) {
+  std::sort(windows.begin(), windows.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  const auto middle = windows.begin() + std::ptrdiff_t(windows.size() / 2);
+  for (const std::vector<TraverseWindow>& half : {std::vector<TraverseWindow>(windows.begin(), middle),
+                                                  std::vector<TraverseWindow>(middle, windows.end())}) {
+    TraverseFit fit = gone_on(data, settings, half, fits[0], fits[0].noise());
+    const double error = Errors(fit).larger();
+    if (std::fabs(std::log(fit.gap() / fits[0].gap())) > kAlike + 3 * error && 2 * error < kAlike)
+      fits.push_back(std::move(fit));
+  }
+}
+
 /// The cheapest first, then those that the record hardly tells from it.
 Fits solve(TraverseData& data, const GapTraverseSettings& settings,
            const std::vector<TraverseWindow>& windows, const Fits& guesses) {
@@ -229,6 +242,7 @@ Fits solve(TraverseData& data, const GapTraverseSettings& settings,
                    [](const auto& a, const auto& b) { return a.fit.cost() < b.fit.cost(); });
   const double most = fits[0].fit.cost() + kRivalCost * Errors(fits[0]).scale();
   while (!(fits.back().fit.cost() <= most)) fits.pop_back();
+  add_halves(fits, data, settings, all);
   return fits;
 }
 
@@ -379,35 +393,18 @@ TraverseData second_data(const record::Record& record, const GapTraverseSettings
        fit.fit.value(kTraverseMotorFriction), kUnsureTorque * fit.rms_of_own(kOwnMotorTorque)});
 }
 
-/// Orders of waves over the motor's turn in what a fit leaves of the torque, the largest first: as far as
-/// they are more than noise would show of so many orders.
+/// Of the torque that a fit leaves, per rad of motor_position.
 std::vector<double> orders_of_waves(const TraverseFit& fit, const TraverseData& data, double motor_turn) {
-  std::vector<double> left, at;
+  std::vector<double> left, angle;
   for (int w = 0; w < fit.windows->count(); ++w) {
     std::vector<std::size_t> samples;
     const Eigen::VectorXd torque =
         fit.windows->torque_left(w, fit.fit.shared, fit.fit.own[std::size_t(w)], &samples);
-    for (std::size_t i = 0; i < samples.size(); ++i)
-      left.push_back(torque[Eigen::Index(i)]),
-          at.push_back(data.position[samples[i]] * 2 * M_PI / motor_turn);
+    left.insert(left.end(), torque.begin(), torque.end());
+    for (const std::size_t i : samples) angle.push_back(data.position[i] * 2 * M_PI / motor_turn);
   }
-  std::vector<double> orders;
-  while (orders.size() < kTorqueWaves / 2) {
-    double best = 0, order = 0, sine = 0, cosine = 0, all = 0;
-    for (const double x : left) all += x * x;
-    for (int n = 1; n <= kMostOrders; ++n) {
-      double s = 0, c = 0;
-      for (std::size_t i = 0; i < left.size(); ++i)
-        s += left[i] * std::sin(n * at[i]), c += left[i] * std::cos(n * at[i]);
-      if (s * s + c * c > best) best = s * s + c * c, order = n, sine = s, cosine = c;
-    }
-    // Of white noise 2 (s^2 + c^2) / all is exponential with mean 1 about each order.
-    if (!(2 * best / all > kWaveSeen * std::log(double(kMostOrders)))) break;
-    orders.push_back(order * 2 * M_PI / motor_turn);
-    for (std::size_t i = 0; i < left.size(); ++i)
-      left[i] -=
-          2 / double(left.size()) * (sine * std::sin(order * at[i]) + cosine * std::cos(order * at[i]));
-  }
+  std::vector<double> orders = wave_orders(std::move(left), angle, kTorqueWaves / 2);
+  for (double& order : orders) order *= 2 * M_PI / motor_turn;
   return orders;
 }
 

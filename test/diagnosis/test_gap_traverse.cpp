@@ -24,6 +24,7 @@ struct Servo {
   double amplitude = 500;           // N m
   double noise = 2, step = 8.7e-7;  // N m, rad
   double duration = 20;
+  double later = 0;                   // rad; > 0: the gap from the middle of the record on
   double load_step = 0;               // rad; > 0: the load has an encoder
   double eccentricity = 0, skew = 0;  // rad, s, of it
   bool smooth = false;                // a stiff speed loop makes the motor follow two sines instead
@@ -55,7 +56,8 @@ struct Servo {
           r.column(record::Channel::load_position).push_back(load_step * std::round(shown / load_step));
         }
       }
-      const double x = qm - ql, in = std::fabs(x) - 0.5 * gap, side = x > 0 ? 1 : -1;
+      const double now = later > 0 && t > 0.5 * duration ? later : gap;
+      const double x = qm - ql, in = std::fabs(x) - 0.5 * now, side = x > 0 ? 1 : -1;
       const double teeth = in > 0 ? side * std::fmax(0.0, pressed(in, side * (wm - wl))) : 0.0;
       wm += kStep / motor_inertia *
             (torque - teeth - motor_viscous * wm - motor_coulomb * std::tanh(wm / 1e-4) -
@@ -133,6 +135,17 @@ TEST(GapTraverse, HoldsForTeethAfterHertzWithBothEncoders) {
   EXPECT_LE(e.angle_lower, servo.gap) << e.message;
   EXPECT_GE(e.angle_upper, servo.gap) << e.message;
   EXPECT_LT(e.angle_upper, 3 * e.angle_lower) << e.message;
+}
+
+// No one play is that of the record: the interval holds both, or there is no answer.
+TEST(GapTraverse, APlayThatStepsIsNeitherOfThemAlone) {
+  for (const double load_step : {0.0, 7e-6}) {
+    Servo servo;
+    servo.load_step = load_step, servo.later = 1.2e-3;
+    const Estimate e = estimate_gap_traverse(servo.record(), declared());
+    EXPECT_TRUE(e.status != Status::ok || (e.angle_lower <= servo.gap && servo.later <= e.angle_upper))
+        << e.angle_lower << " to " << e.angle_upper << ": " << e.message;
+  }
 }
 
 // One flank is pressed throughout: its deflection says nothing of the other.

@@ -37,11 +37,12 @@
 // quick ones alone show a smaller play; stiffness and inertias are within four spreads of the declared ones;
 // a third of the channel at most is left beyond noise; the interval is narrower than a factor of four.
 //
-// Interval, 95 %, of all plays that fit alike: Student's t with the larger of two standard errors of the
-// logarithm (the fit's own; windows as clusters), 4 % of the play for what the machine does not hold (15 % by
-// the motor alone) and the share of the channel that is left beyond noise, and a fifth of the deflection of a
-// flank under T0 for laws of teeth that are none of these. Counted on joints of test/campaigns/robot_joints
-// that were drawn afterwards (doc/reference/estimators.md).
+// Interval, 95 %, of all plays that fit alike, and of either half of the record where that is sure of
+// another: Student's t with the larger of two standard errors of the logarithm (the fit's own; windows as
+// clusters), 4 % of the play for what the machine does not hold (15 % by the motor alone) and the share of
+// the channel that is left beyond noise, and a fifth of the deflection of a flank under T0 for laws of teeth
+// that are none of these. Counted on joints of test/campaigns/robot_joints that were drawn afterwards
+// (doc/reference/estimators.md).
 //
 // Needs motor_position, and load_position or motor_torque. Samples are put on an even grid
 // (record/even_grid.h), of at least two samples in a cycle of the motor against the load, four by the motor
