@@ -26,6 +26,7 @@ constexpr int kFewest = 20,
               kFewestFirst = 8;  // crossings by the motor alone, for the answer and to know the motor
 constexpr int kMost = 60;        // windows, beyond which the errors do not shrink
 constexpr int kMostWide = 45;    // of them, in which both flanks are seen
+constexpr double kWide = 0.5;    // of the range in most windows: both flanks are seen
 constexpr int kSearched = 16;    // windows of a first guess
 constexpr int kSearch = 20;      // steps of one
 constexpr double kGuesses[] = {0.3, 0.55, 1, 1.8, 3.3};  // times the declared gap
@@ -52,9 +53,9 @@ constexpr double kVague = 4;    // upper over lower end of an interval, by which
 constexpr double kRivalCost = 9;  // theory: three standard errors
 constexpr double kLaw =
     0.2;  // of the deflection of a flank: laws of teeth that are in no prior, 95 %: simulation
-constexpr double kModelByLoad = 0.04;  // the same with the load's encoder, whose error follows the place
-constexpr double kModel =
-    0.15;  // of the play by the motor alone: what moves it beside the declared, 95 %: simulation
+// Of the play: what moves it beside the declared, by the motor alone and with the load's encoder, whose error
+// follows the place; 95 %: simulation.
+constexpr double kModel = 0.15, kModelByLoad = 0.04;
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid || !std::isfinite(value)) throw InvalidParameter(name, value, limit);
@@ -241,6 +242,8 @@ Fits solve(TraverseData& data, const GapTraverseSettings& settings,
   std::stable_sort(fits.begin(), fits.end(),
                    [](const auto& a, const auto& b) { return a.fit.cost() < b.fit.cost(); });
   const double most = fits[0].fit.cost() + kRivalCost * Errors(fits[0]).scale();
+  if (!std::isfinite(most))
+    throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
   while (!(fits.back().fit.cost() <= most)) fits.pop_back();
   add_halves(fits, data, settings, all);
   return fits;
@@ -348,7 +351,7 @@ void by_load(Estimate& e, const record::Record& record, const GapTraverseSetting
   std::vector<TraverseWindow> wide,
       narrow;  // where both flanks are seen, and others, which show what the encoders err
   for (const TraverseWindow& window : data.windows)
-    (window.width > 0.5 * data.window_width ? wide : narrow).push_back(window);
+    (window.width > kWide * data.window_width ? wide : narrow).push_back(window);
   std::vector<TraverseWindow> chosen = some(wide, kMostWide);
   for (const TraverseWindow& window : some(narrow, kMost - int(chosen.size()))) chosen.push_back(window);
   std::vector<double> starts;
@@ -369,7 +372,7 @@ void require_crossings(const TraverseData& data, int fewest) {
 }
 
 /// Those that are left out take long, or begin in no clear press, as of a large play they do: where they are
-/// many, what is left has been told of a play of half the size, with nothing but noise left.
+/// many, the others have shown a play of half the size, with nothing but noise left.
 void require_most(const TraverseData& data) {
   if (double(data.within) >= kFewOf * double(data.crossings)) return;
   throw Refusal{

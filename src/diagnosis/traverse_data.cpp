@@ -254,6 +254,9 @@ void read_load(TraverseData& d, const record::EvenGrid& even, const GapTraverseS
   const double low = signal::quantile(apart, kEnd), high = signal::quantile(apart, 1 - kEnd);
   const double middle = 0.5 * (low + high);
   d.width = high - low;
+  if (!(signal::peak_to_peak(d.load) > 0) || !(d.width > 0))
+    throw Refusal{Status::insufficient_data, d.width > 0 ? "load_position stands still"
+                                                         : "motor_position and load_position are one signal"};
   // From every other sample the ones between follow by a cubic, where the motion is resolved.
   std::vector<double> left;
   for (std::size_t i = 3; i + 3 < n; ++i)

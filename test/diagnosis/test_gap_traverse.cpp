@@ -253,6 +253,13 @@ TEST(GapTraverse, RecordsThatCannotServeAreAnswered) {
               for (double& q : r.column(Channel::motor_position)) q = 0.1;
             }).status,
             Status::insufficient_data);
+  Servo both;
+  both.load_step = 7e-6;
+  record::Record r = both.record();
+  r.column(Channel::load_position) = r.column(Channel::motor_position);
+  EXPECT_EQ(estimate_gap_traverse(r, declared()).status, Status::insufficient_data);
+  for (double& q : r.column(Channel::load_position)) q = 0.1;
+  EXPECT_EQ(estimate_gap_traverse(r, declared()).status, Status::insufficient_data);
   const Estimate coarse = estimate_gap_traverse(Servo().record(100), declared());
   EXPECT_EQ(coarse.status, Status::out_of_domain);
   EXPECT_NE(coarse.message.find("does not resolve"), std::string::npos) << coarse.message;
