@@ -3,13 +3,13 @@
 """Checks that every room is in its namespace, and includes only headers of rooms that it may know and private headers of
 no other room.
 
-What a room may know is what CMakeLists.txt says: room(NAME KNOWS ROOM... [READS_PRIVATE ROOM]), and all that those know.
+What a room may know is what CMakeLists.txt says: room(NAME [FOLDER FOLDER] KNOWS ROOM... [READS_PRIVATE ROOM]), and all that those know.
 """
 import os
 import re
 import sys
 
-ROOM = re.compile(r"^room\((\w+)(?: COMPUTES)?((?: KNOWS(?: [a-z_]+)+)?)(?: READS_PRIVATE (\w+))?", re.MULTILINE)
+ROOM = re.compile(r"^room\((\w+)(?: COMPUTES)?(?: FOLDER (\S+))?((?: KNOWS(?: [a-z_]+)+)?)(?: READS_PRIVATE (\w+))?", re.MULTILINE)
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 
@@ -20,27 +20,34 @@ PROGRAMS = ("nodes", "tools")  # read private headers of all: nobody links them
 
 
 def known_rooms(cmake_file):
-    """Room -> rooms that it may include, itself among them; the same for their private headers."""
-    known, private = {}, {}
-    for name, knows, reads_private in ROOM.findall(open(cmake_file).read()):
+    """Room -> rooms that it may include, itself among them; the same for their private headers; folder -> room of inner ones."""
+    known, private, inner = {}, {}, {}
+    for name, folder, knows, reads_private in ROOM.findall(open(cmake_file).read()):
+        if folder:
+            inner[folder] = name
         known[name] = {name}
         private[name] = {name, reads_private}
         for other in knows.split()[1:]:
             known[name] |= known[other]
     for program in PROGRAMS:
         known[program] = private[program] = set(known) | {program}
-    return known, private
+    return known, private, inner
 
 
-def room_of_include(name, path, include, src):
+def room_of(path, inner):
+    """The room of a file, by its path in src or include."""
+    return next((room for folder, room in inner.items() if path.startswith(folder + "/")), path.split("/")[0])
+
+
+def room_of_include(name, path, inner, src):
     """The room of what a file includes, and whether it is private to that room; None for what is generated."""
     if name.startswith("backlash_diagnosis/"):
         parts = name.split("/")
-        return (parts[1], False) if len(parts) > 2 else None
+        return (room_of("/".join(parts[1:]), inner), False) if len(parts) > 2 else None
     for folder in (os.path.dirname(path), src):
         found = os.path.normpath(os.path.join(folder, name))
         if os.path.exists(found):
-            return os.path.relpath(found, src).split(os.sep)[0], True
+            return room_of(os.path.relpath(found, src), inner), True
     return None
 
 
@@ -54,16 +61,16 @@ def misnamed(path, room, text):
 
 
 def main(cmake_file, include, src):
-    known, private = known_rooms(cmake_file)
+    known, private, inner = known_rooms(cmake_file)
     problems = []
     for root in (include, src):
         for folder, _, names in os.walk(root):
             for path in (os.path.join(folder, name) for name in names if name.endswith((".h", ".cpp"))):
-                room = os.path.relpath(path, root).split(os.sep)[0]
+                room = room_of(os.path.relpath(path, root), inner)
                 text = open(path).read()
                 problems += filter(None, [misnamed(path, room, text)])
                 for name in INCLUDE.findall(text):
-                    target = room_of_include(name, path, include, src)
+                    target = room_of_include(name, path, inner, src)
                     if target is None:
                         continue
                     if target[0] not in known[room]:

@@ -31,6 +31,7 @@ esac
 command=("$@")
 ((${#command[@]})) || command=(bash scripts/test.sh)
 home=/srv/backlash_diagnosis  # of the clone in the root
+cache_inside=/srv/ccache       # of the compiler, there
 
 # All that this script mounts, and all that the tests start, lives in namespaces that end with the script, however it
 # ends: nothing is left to unmount, and who deletes the root later does not reach through a mount.
@@ -100,8 +101,8 @@ mount_root() {
   fi
   local cache
   if ((${#fresh[@]})) && cache=$(ccache --get-config cache_dir 2>/dev/null) && [[ -n ${cache} ]]; then
-    mkdir -p "${cache}" "${root}/root/.cache/ccache"
-    mount --bind "${cache}" "${root}/root/.cache/ccache" || fail "cannot mount ${cache}"
+    mkdir -p "${cache}" "${root}${cache_inside}"
+    mount --bind "${cache}" "${root}${cache_inside}" || fail "cannot mount ${cache}"
   fi
 }
 
@@ -122,5 +123,5 @@ clone
 prepare=true what="nothing"
 ((${#fresh[@]})) || prepare="bash scripts/install_dependencies.sh test" what="the dependencies"
 echo "Debian ${suite}, commit $(git -C "${root}${home}" rev-parse --short HEAD): installing ${what}, then ${command[*]}"
-chroot "${root}" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 "TERM=${TERM:-dumb}" "CI=${CI:-}" \
+chroot "${root}" env -i HOME=/root "CCACHE_DIR=${cache_inside}" PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 "TERM=${TERM:-dumb}" "CI=${CI:-}" \
   bash -c "cd \"\$0\" && ${prepare} && exec \"\$@\"" "${home}" "${command[@]}"

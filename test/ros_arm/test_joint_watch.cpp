@@ -14,8 +14,8 @@
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/base/scratch_folder.h"
 #include "backlash_diagnosis/report/change_file.h"
-#include "backlash_diagnosis/ros_arm/change_watch_node.h"
-#include "backlash_diagnosis/ros_arm/joint_watch.h"
+#include "backlash_diagnosis/ros/arm/change_watch_node.h"
+#include "backlash_diagnosis/ros/arm/joint_watch.h"
 
 namespace backlash::ros_bridge {
 namespace {

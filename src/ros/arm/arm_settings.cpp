@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "ros_arm/arm_settings.h"
+#include "ros/arm/arm_settings.h"
 
 #include "ros/given_parameters.h"
 

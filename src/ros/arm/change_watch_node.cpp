@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/ros_arm/change_watch_node.h"
+#include "backlash_diagnosis/ros/arm/change_watch_node.h"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/ros_arm/joint_watch.h"
+#include "backlash_diagnosis/ros/arm/joint_watch.h"
 
 #include <fmt/format.h>
 #include <ros/console.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "ros_arm/simulated_arm.h"
+#include "ros/arm/simulated_arm.h"
 
 #include <ros/console.h>
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/ros/joint_inputs.h"
-#include "backlash_diagnosis/ros_arm/joint_watch.h"
+#include "backlash_diagnosis/ros/arm/joint_watch.h"
 
 namespace backlash::ros_bridge {
 

@@ -20,7 +20,7 @@
 #include "backlash_diagnosis/ros/joint_controls.h"
 #include "backlash_diagnosis/ros/joint_state.h"
 #include "backlash_diagnosis/ros/simulated_machine.h"
-#include "ros_arm/arm_settings.h"
+#include "ros/arm/arm_settings.h"
 
 namespace backlash::ros_bridge {
 
