@@ -5,8 +5,8 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file_folder.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/ros/node_folders.h"
 #include "backlash_diagnosis/ros/arm/change_watch_node.h"
+#include "backlash_diagnosis/ros/node_folders.h"
 
 namespace backlash::ros_bridge {
 namespace {

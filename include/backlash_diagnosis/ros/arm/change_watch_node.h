@@ -14,8 +14,8 @@
 #include <thread>
 #include <vector>
 
-#include "backlash_diagnosis/ros/joint_inputs.h"
 #include "backlash_diagnosis/ros/arm/joint_watch.h"
+#include "backlash_diagnosis/ros/joint_inputs.h"
 
 namespace backlash::ros_bridge {
 
