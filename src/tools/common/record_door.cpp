@@ -61,6 +61,18 @@ void refuse_frozen(const report::CheckedFile& file) {
     if (finding.kind == record::FindingKind::frozen) throw CannotIdentify(file.path + ": " + finding.message);
 }
 
+/// Whether all joints, of several, jump with this one: a recording that goes on elsewhere, as no encoder is
+/// at fault of all.
+bool all_jump(const report::CheckedFile& file, const record::Jump& jump) {
+  return file.joints.size() > 1 &&
+         std::all_of(file.joints.begin(), file.joints.end(), [&](const auto& joint) {
+           const std::vector<record::Jump>& jumps = joint.check.jumps;
+           return std::any_of(jumps.begin(), jumps.end(), [&](const record::Jump& other) {
+             return other.before <= jump.after && jump.before <= other.after;
+           });
+         });
+}
+
 }  // namespace
 
 report::CheckedFile checked_joints(std::vector<record::JointRecord>& joints, const std::string& path) {
@@ -147,7 +159,10 @@ std::vector<record::JointRecord> RecordDoor::admit_with_jumps(std::vector<record
   joints = look(std::move(joints), path);
   refuse_frozen(files_.back());
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    const std::vector<record::Jump>& found = files_.back().joints[j].check.jumps;
+    std::vector<record::Jump> found = files_.back().joints[j].check.jumps;
+    found.erase(std::remove_if(found.begin(), found.end(),
+                               [&](const record::Jump& jump) { return all_jump(files_.back(), jump); }),
+                found.end());
     joints[j].record = record::without_jumps(std::move(joints[j].record), found);
     for (const record::Jump& jump : found) jumps.push_back({joints[j].joint, jump});
   }
