@@ -87,17 +87,21 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
     }
   }
   // Links that are known hold what all constants have in common: then it is no unknown of the fit.
-  const double common = freedom.links ? rig.common_error : 0;
-  Eigen::MatrixXd together =
-      Eigen::MatrixXd::Constant(Eigen::Index(own.size()), Eigen::Index(own.size()), common * common);
-  for (std::size_t i = 0; i < own.size(); ++i) together(Eigen::Index(i), Eigen::Index(i)) += own[i];
-  if (!own.empty()) kappa_precision_ = signal::symmetric_inverse(together);
+  set_constants(own, freedom.links ? rig.common_error : 0);
   for (std::size_t i = 0; i < freedom.effects.size(); ++i) {
     const FreeEffect& e = freedom.effects[i];
     if (e.effect.spec().has_shape())
       normal_.push_back({layout_.effect(Eigen::Index(i)) + kEffectUnknowns - 1, e.effect.shape,
                          1 / (e.shape_spread * e.shape_spread)});
   }
+}
+
+/// The precision of all constants together: variances of each, and the error that they share.
+void Priors::set_constants(const std::vector<double>& own, double common) {
+  const auto n = Eigen::Index(own.size());
+  Eigen::MatrixXd together = Eigen::MatrixXd::Constant(n, n, common * common);
+  for (Eigen::Index i = 0; i < n; ++i) together(i, i) += own[std::size_t(i)];
+  if (n > 0) kappa_precision_ = signal::symmetric_inverse(together);
 }
 
 Eigen::VectorXd Priors::vector_of(const State& state) const {

@@ -45,6 +45,7 @@ class Priors {
   void add_derivatives(const Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& curvature) const;
   Eigen::VectorXd vector_of(const State& state) const;
   void follow(const Eigen::VectorXd& x);
+  void set_constants(const std::vector<double>& own, double common);
 
   Layout layout_;
   double weight_ = 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What of the links' standard parameters the motions tell apart (Gautier 1991, J. Robotic Systems 8:485): the
-// columns of the regressor that are no combination of those before them lead a base parameter each, the
+// What of the links' standard parameters the motions distinguish (Gautier 1991, J. Robotic Systems 8:485):
+// the columns of the regressor that are no combination of those before them lead a base parameter each, the
 // others go with them. Torques depend on the base parameters alone: the rest may be anything.
 #pragma once
 

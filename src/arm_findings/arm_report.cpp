@@ -122,7 +122,7 @@ report::Json payloads_json(const arm::ArmFit& fit, const std::vector<LoadedRecor
   return all;
 }
 
-/// Standard parameters that no motion tells apart from others, or shows at all: any value would do, the
+/// Standard parameters that no motion distinguishes from others, or shows at all: any value would do, the
 /// interval is infinite.
 report::Json not_identifiable_json(const arm::ArmFit& fit) {
   report::Json all = report::Json::object();

@@ -48,7 +48,7 @@ class ArmChanges {
   bool is_left_by_chain(const ArmJoint& joint, std::size_t place, const Change& change) const;
   double left(const FoundChainChange& f) const;
   Change told(const FoundChainChange& f) const;
-  void tell_scale();
+  void add_scale();
 
   std::deque<ArmJoint>& joints() { return arm_->joints(); }
   const ArmJoint& first() const { return arm_->joints().front(); }
@@ -316,7 +316,7 @@ void ArmChanges::tell_deflection(std::size_t index) {
 }
 
 /// A mass has the scale of the torque constants.
-void ArmChanges::tell_scale() {
+void ArmChanges::add_scale() {
   const double common = arm_->fit().rig.common_error;
   if (common > 0 && std::any_of(chain_.begin(), chain_.end(),
                                 [](const FoundChainChange& f) { return f.effect.values > 1; }))
@@ -338,7 +338,7 @@ Changes ArmChanges::run(const std::vector<arm::ArmRecord>& healthy, const arm::A
   for (std::size_t j = 0; j < joints().size(); ++j) tell_joint(joints()[j], j);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) tell_deflection(j);
   for (const FoundChainChange& f : chain_) out_.changes.push_back(told(f));
-  tell_scale();
+  add_scale();
   std::sort(out_.changes.begin(), out_.changes.end(),
             [](const Change& a, const Change& b) { return a.since < b.since; });
   return out_;
