@@ -15,7 +15,7 @@ build=(
   libboost-dev libboost-program-options-dev libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev
   liblz4-dev libsqlite3-dev libzstd-dev                           # recordings of ROS 2
   libceres-dev libsundials-dev                                    # SUNDIALS has no rosdep key, hence not in package.xml
-  liburdfdom-dev liburdfdom-headers-dev                           # robots as URDF
+  liburdfdom-dev liburdfdom-headers-dev libexpat1-dev             # robots as URDF, and what is written into one
 )
 run=(
   rosbash python3-rosnode                                         # rosrun, rosnode

@@ -24,11 +24,18 @@ const std::array<DriveTermSpec, kDriveTerms> kDriveTermSpecs = {{{"rotor_inertia
                                                                  {"offset", "N m", false},
                                                                  {"load", "-", true}}};
 
+const std::array<const char*, 10> kStandardNames = {"mass",       "moment_x",   "moment_y",   "moment_z",
+                                                    "inertia_xx", "inertia_xy", "inertia_xz", "inertia_yy",
+                                                    "inertia_yz", "inertia_zz"};
+const std::array<const char*, 10> kStandardUnits = {"kg",     "kg m",   "kg m",   "kg m",   "kg m^2",
+                                                    "kg m^2", "kg m^2", "kg m^2", "kg m^2", "kg m^2"};
+
 namespace {
 
 constexpr int kSchema = 1;
-const Range kCutoff = {0.1, 1000, false};  // Hz; choice
-constexpr double kLongestDelay = 0.2;      // s; choice: more is another record
+const char *const kNotShown = "not_shown", *const kInSums = "in_sums";  // keys of a fitted link
+const Range kCutoff = {0.1, 1000, false};                               // Hz; choice
+constexpr double kLongestDelay = 0.2;                                   // s; choice: more is another record
 
 Eigen::Vector3d vector(const YamlReader& yaml, const std::string& key, std::size_t size = 3) {
   const std::vector<double> v = yaml.numbers(key, Range::any());
@@ -103,13 +110,27 @@ std::size_t link_index(const Chain& chain, const YamlReader& yaml, const std::st
   yaml.fail(key, "no such link; there are: " + joined(links));
 }
 
+/// The standard parameters of a link that a list names.
+void read_shown(const YamlReader& link, const char* key, Shown as, std::size_t index, ArmRig& rig) {
+  if (!link.has(key)) return;
+  for (const std::string& name : link.texts(key)) {
+    const auto found = std::find(kStandardNames.begin(), kStandardNames.end(), name);
+    if (found == kStandardNames.end())
+      link.fail(key, "'" + printable(name) + "': known are " + joined(kStandardNames));
+    rig.shown[10 * index + std::size_t(found - kStandardNames.begin())] = as;
+  }
+}
+
 void read_links(const YamlReader& yaml, ArmRig& rig) {
   std::vector<char> seen(rig.chain.size(), 0);
+  rig.shown.assign(10 * rig.chain.size(), Shown::leads);
   for (const YamlReader& link : yaml.maps("links")) {
     const std::size_t i = link_index(rig.chain, link, "link");
     if (seen[i]) link.fail("link", "there twice");
     seen[i] = 1;
     rig.chain.links[i] = parameters_of(read_body(link));
+    read_shown(link, kNotShown, Shown::not_at_all, i, rig);
+    read_shown(link, kInSums, Shown::in_others, i, rig);
   }
   if (std::find(seen.begin(), seen.end(), 0) != seen.end())
     yaml.fail("links", "must name all links that move");
@@ -245,6 +266,14 @@ std::string body_text(const BodyParameters& parameters) {
       b.inertia(1, 1), b.inertia(1, 2), b.inertia(2, 2));
 }
 
+/// What the motions do not show of a link, as read_shown() reads it.
+std::string shown_text(const ArmRig& rig, std::size_t link, const char* key, Shown as) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < 10 && !rig.shown.empty(); ++i)
+    if (rig.shown[10 * link + i] == as) names.emplace_back(kStandardNames[i]);
+  return names.empty() ? "" : fmt::format(",\n     {}: [{}]", key, joined(names));
+}
+
 std::string joint_text(const ArmRig& rig, const JointDrive& joint) {
   std::string text = "  - name: " + joint.name + "\n";
   if (rig.channel == record::Channel::motor_current) {
@@ -302,15 +331,21 @@ std::string arm_rig_text(const ArmRig& rig, const std::vector<std::string>& comm
   if (rig.fitted) {
     text +=
         "\nlinks:  # kg, m, kg m^2; in the frame of the joint that turns them; inertia about the centre: xx, "
-        "xy, xz, yy, yz, zz\n";
+        "xy, xz, yy, yz, zz;\n  # not_shown: no motion shows it; in_sums: only in a sum with others\n";
     for (std::size_t i = 0; i < rig.chain.size(); ++i)
-      text += "  - {link: " + rig.chain.joints[i].link + ", " + body_text(rig.chain.links[i]) + "}\n";
+      text += "  - {link: " + rig.chain.joints[i].link + ", " + body_text(rig.chain.links[i]) +
+              shown_text(rig, i, kNotShown, Shown::not_at_all) +
+              shown_text(rig, i, kInSums, Shown::in_others) + "}\n";
   }
   if (!rig.payloads.empty()) text += "\npayloads:\n";
   for (const Payload& p : rig.payloads)
     text += "  - {link: " + p.link + ", " + (p.sign < 0 ? "removed: true, " : "") + body_text(p.parameters) +
             "}\n";
   return text;
+}
+
+std::string standard_name(const Chain& chain, std::size_t index) {
+  return chain.joints[index / 10].link + "/" + kStandardNames[index % 10];
 }
 
 Chain loaded_chain(const ArmRig& rig) {

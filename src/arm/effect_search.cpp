@@ -111,7 +111,7 @@ Search::Search(const ArmFit& fit, const FitFreedom& freedom, const std::vector<F
   for (const FittedMotion& m : motions) {
     linear_.push_back(model_.linearised(state_, m));
     thin_.push_back(thinned(*m.motion));
-    chain_.push_back(model_.chain_torque(state_, {&thin_.back(), m.marked}));
+    chain_.push_back(model_.chain_torque(state_, {&thin_.back(), m.state}));
     drives_.emplace_back();
     for (std::size_t j = 0; j < fit.rig.joints.size(); ++j)
       drives_.back().emplace_back(fit.rig.joints[j].constant * linear_.back()[j].predicted);

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "fit_model.h"
 #include "fit_priors.h"
+#include "regrouping.h"
 
 namespace backlash::arm {
 namespace {
@@ -76,7 +78,7 @@ class Fit {
                              const std::vector<std::vector<Linearised>>& all) const;
   ArmFit result(const Eigen::MatrixXd& covariance, const std::vector<std::vector<Linearised>>& all) const;
   void set_drives(ArmFit& fit, const Eigen::MatrixXd& covariance) const;
-  void set_payload(ArmFit& fit, const Eigen::MatrixXd& covariance) const;
+  FittedState marked_state(Eigen::Index s, const Eigen::MatrixXd& covariance) const;
   void set_errors(ArmFit& fit, const std::vector<std::vector<Linearised>>& all) const;
 
   const ArmRig& rig_;
@@ -180,12 +182,14 @@ std::vector<char> Fit::free_unknowns(bool first) const {
     for (Eigen::Index i = from; i < from + count; ++i) free[std::size_t(i)] = 1;
   };
   if (freedom_.links) set(0, layout_.payload());
-  if (freedom_.payload) set(layout_.payload(), 10);
+  if (freedom_.payload) set(layout_.payload(), 10 * layout_.states);
   if (freedom_.tilt) set(layout_.tilt(), 2);
   for (Eigen::Index j = 0; j < layout_.joints; ++j) {
     if (!moves_[std::size_t(j)]) continue;
-    if (freedom_.friction) set(layout_.shift(j), 1);
-    if (freedom_.rubs_otherwise(std::size_t(j))) set(layout_.friction(j), 1);
+    for (Eigen::Index s = 0; s < layout_.states; ++s) {
+      if (freedom_.friction) set(layout_.shift(j, s), 1);
+      if (freedom_.rubs_otherwise(std::size_t(j))) set(layout_.friction(j, s), 1);
+    }
     if (freedom_.of_drive(std::size_t(j)))
       for (const DriveTerm t : rig_.terms) set(layout_.drive(j) + Eigen::Index(t), 1);
     if (freedom_.load && rig_.joints[std::size_t(j)].load_error > 0)
@@ -207,10 +211,12 @@ std::vector<char> Fit::free_unknowns(bool first) const {
 void Fit::apply(const Eigen::VectorXd& step) {
   for (Eigen::Index i = 0; i < layout_.joints; ++i)
     state_.links[std::size_t(i)] += step.segment<10>(layout_.link(i));
-  state_.payload += step.segment<10>(layout_.payload());
   state_.tilt += step.segment<2>(layout_.tilt());
-  state_.friction += step.segment(layout_.friction(0), layout_.joints);
-  state_.shift += step.segment(layout_.shift(0), layout_.joints);
+  for (Eigen::Index s = 0; s < layout_.states; ++s) {
+    state_.payloads[std::size_t(s)] += step.segment<10>(layout_.payload(s));
+    state_.friction.col(s) += step.segment(layout_.friction(0, s), layout_.joints);
+    state_.shift.col(s) += step.segment(layout_.shift(0, s), layout_.joints);
+  }
   for (Eigen::Index j = 0; j < layout_.joints; ++j)
     state_.drives.row(j) += step.segment(layout_.drive(j), kDriveUnknowns).transpose();
   for (std::size_t i = 0; i < state_.effects.size(); ++i) {
@@ -250,7 +256,7 @@ Eigen::MatrixXd Fit::lags(const std::vector<std::vector<Linearised>>& all) const
     Normal sum{Eigen::MatrixXd::Zero(layout_.size(), layout_.size()), Eigen::VectorXd::Zero(layout_.size())};
     double squares = 0, count = 0;
     for (std::size_t m = 0; m < all.size(); ++m) {
-      if (!motions_[m].marked) continue;
+      if (!motions_[m].marked()) continue;
       const ArmMotion& motion = *motions_[m].motion;
       add_rows(all[m][j], motion, j, 0, Eigen::Index(motion.rows.size()), sum);
       squares += motion.drive[j].col(int(DriveTerm::rotor_inertia)).squaredNorm();
@@ -316,11 +322,16 @@ Eigen::MatrixXd Fit::covariance(const std::vector<Normal>& blocks,
 
 void Fit::set_drives(ArmFit& fit, const Eigen::MatrixXd& covariance) const {
   const Eigen::Index count = layout_.joints;
-  double shared = 0, pairs = 0;
-  for (Eigen::Index j = 0; j < count; ++j)
+  double shared = 0, pairs = 0, least = std::numeric_limits<double>::infinity();
+  for (Eigen::Index j = 0; j < count; ++j) {
+    if (const double own = covariance(layout_.kappa(j), layout_.kappa(j)); own > 0)
+      least = std::min(least, own);
     for (Eigen::Index i = 0; i < j; ++i)
       if (const double c = covariance(layout_.kappa(i), layout_.kappa(j)); c != 0) shared += c, pairs += 1;
-  if (freedom_.constants && pairs > 0) fit.rig.common_error = std::sqrt(std::max(0.0, shared / pairs));
+  }
+  // What all share is no more than the best of them is known to: each has the rest by itself.
+  if (freedom_.constants && pairs > 0)
+    fit.rig.common_error = std::sqrt(std::max(0.0, std::min(shared / pairs, least)));
   for (Eigen::Index j = 0; j < count; ++j) {
     JointDrive& drive = fit.rig.joints[std::size_t(j)];
     std::vector<signal::Measured> values;
@@ -344,17 +355,28 @@ void Fit::set_drives(ArmFit& fit, const Eigen::MatrixXd& covariance) const {
   }
 }
 
-void Fit::set_payload(ArmFit& fit, const Eigen::MatrixXd& covariance) const {
-  const Eigen::MatrixXd c = covariance.block(layout_.payload(), layout_.payload(), 4, 4);
-  fit.payload = freedom_.payload_sign * state_.payload;
-  const double mass = state_.payload[0];
-  fit.mass = {freedom_.payload_sign * mass, std::sqrt(c(0, 0))};
+FittedState Fit::marked_state(Eigen::Index s, const Eigen::MatrixXd& covariance) const {
+  FittedState out;
+  for (Eigen::Index j = 0; j < layout_.joints; ++j) {
+    const double factor = std::exp(state_.friction(j, s));
+    const Eigen::Index place = layout_.friction(j, s);
+    out.shifts.push_back(state_.shift(j, s));
+    out.friction_factors.push_back({factor, factor * std::sqrt(std::max(0.0, covariance(place, place)))});
+  }
+  if (!freedom_.payload) return out;
+  const Eigen::MatrixXd c = covariance.block(layout_.payload(s), layout_.payload(s), 4, 4);
+  const BodyParameters& body = state_.payloads[std::size_t(s)];
+  const double mass = body[0];
+  out.payload = freedom_.payload_sign * body;
+  out.moment_covariance = c.block<3, 3>(1, 1);
+  out.mass = {freedom_.payload_sign * mass, std::sqrt(c(0, 0))};
   for (int i = 0; i < 3; ++i) {
-    const double centre = state_.payload[1 + i] / mass;
+    const double centre = body[1 + i] / mass;
     const double variance =
         (c(1 + i, 1 + i) - 2 * centre * c(0, 1 + i) + centre * centre * c(0, 0)) / (mass * mass);
-    fit.centre[i] = {centre, std::sqrt(std::max(0.0, variance))};
+    out.centre[i] = {centre, std::sqrt(std::max(0.0, variance))};
   }
+  return out;
 }
 
 void Fit::set_errors(ArmFit& fit, const std::vector<std::vector<Linearised>>& all) const {
@@ -386,22 +408,17 @@ ArmFit Fit::result(const Eigen::MatrixXd& covariance, const std::vector<std::vec
   fit.deviation = deviation_;
   fit.covariance = covariance;
   set_drives(fit, covariance);
-  if (freedom_.payload) set_payload(fit, covariance);
   for (Eigen::Index i = 0; i < 2; ++i)
     fit.tilt[i] = {state_.tilt[i], std::sqrt(covariance(layout_.tilt() + i, layout_.tilt() + i))};
-  for (Eigen::Index j = 0; j < layout_.joints; ++j) {
-    const double factor = std::exp(state_.friction[j]);
-    const Eigen::Index place = layout_.friction(j);
-    fit.shifts.push_back(state_.shift[j]);
-    fit.friction_factors.push_back({factor, factor * std::sqrt(std::max(0.0, covariance(place, place)))});
-  }
+  fit.states.clear();
+  for (Eigen::Index s = 0; s < layout_.states; ++s) fit.states.push_back(marked_state(s, covariance));
   for (std::size_t i = 0; i < state_.effects.size(); ++i) {
     const Eigen::Index place = layout_.effect(Eigen::Index(i));
     fit.effects.push_back({state_.effects[i], covariance.block<3, 3>(place, place)});
     const auto joint = Eigen::Index(freedom_.effects[i].joint);
     double count = 0, sum = 0, squares = 0;
     for (const FittedMotion& m : motions_) {
-      if (!m.marked && !freedom_.effects[i].everywhere) continue;
+      if (!m.marked() && !freedom_.effects[i].everywhere) continue;
       for (const std::size_t row : m.motion->rows) {
         const double q = m.motion->q(Eigen::Index(row), joint);
         count += 1, sum += q, squares += q * q;
@@ -411,7 +428,12 @@ ArmFit Fit::result(const Eigen::MatrixXd& covariance, const std::vector<std::vec
     fit.effects.back().spread = std::sqrt(std::max(0.0, squares / count - sum * sum / (count * count)));
   }
   set_errors(fit, all);
-  if (freedom_.links) fit.base = base_parameters(rig_, motions_, state_, covariance);
+  if (freedom_.links) {
+    const Regrouping regrouping(rig_.chain, motions_);
+    fit.base = regrouping.base_parameters(rig_.chain, state_.links, covariance);
+    fit.rig.shown = regrouping.shown();
+    fit.rig.chain.links = regrouping.nearest(rig_.chain.links, state_.links);
+  }
   return fit;
 }
 

@@ -55,7 +55,8 @@ bool FitFreedom::of_drive(std::size_t joint) const {
 }
 
 Layout layout_of(const ArmRig& rig, const FitFreedom& freedom) {
-  return {Eigen::Index(rig.joints.size()), Eigen::Index(freedom.effects.size())};
+  return {Eigen::Index(rig.joints.size()), Eigen::Index(freedom.effects.size()),
+          Eigen::Index(freedom.states())};
 }
 
 double FitModel::factor(const State& state, std::size_t j) const {
@@ -65,7 +66,9 @@ double FitModel::factor(const State& state, std::size_t j) const {
 State FitModel::start() const {
   State state;
   state.links = rig_.chain.links;
-  state.friction = state.shift = Eigen::VectorXd::Zero(Eigen::Index(rig_.joints.size()));
+  state.payloads.assign(freedom_.states(), BodyParameters::Zero());
+  state.friction = state.shift =
+      Eigen::MatrixXd::Zero(Eigen::Index(rig_.joints.size()), Eigen::Index(freedom_.states()));
   state.drives = Eigen::MatrixXd::Zero(Eigen::Index(rig_.joints.size()), kDriveUnknowns);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     for (std::size_t t = 0; t < kDriveTerms; ++t)
@@ -76,21 +79,21 @@ State FitModel::start() const {
   return state;
 }
 
-Chain FitModel::chain(const State& state, bool marked) const {
+Chain FitModel::chain(const State& state, std::size_t of) const {
   Chain chain = rig_.chain;
   chain.links = state.links;
   for (const Payload& payload : rig_.payloads)
     for (std::size_t i = 0; i < chain.size(); ++i)
       if (chain.joints[i].link == payload.link) chain.links[i] += payload.sign * payload.parameters;
-  if (!marked) return chain;
-  if (freedom_.payload) chain.links[*freedom_.payload] += freedom_.payload_sign * state.payload;
+  if (of == 0) return chain;
+  if (freedom_.payload) chain.links[*freedom_.payload] += freedom_.payload_sign * state.payloads[of - 1];
   if (freedom_.tilt) chain.gravity = tilted(chain.gravity, state.tilt);
   return chain;
 }
 
 Eigen::MatrixXd FitModel::chain_torque(const State& state, const FittedMotion& motion) const {
   const ArmMotion& m = *motion.motion;
-  const Chain loaded = chain(state, motion.marked);
+  const Chain loaded = chain(state, motion.state);
   Eigen::MatrixXd torque(Eigen::Index(m.time.size()), m.q.cols());
   for (Eigen::Index k = 0; k < torque.rows(); ++k)
     torque.row(k) = inverse_dynamics(loaded, m.q.row(k), m.v.row(k), m.a.row(k)).transpose();
@@ -111,9 +114,9 @@ bool FitModel::something_follows_load() const {
 
 std::vector<Linearised> FitModel::linearised(const State& state, const FittedMotion& motion) const {
   const ArmMotion& m = *motion.motion;
-  const Chain loaded = chain(state, motion.marked);
+  const Chain loaded = chain(state, motion.state);
   const auto n = Eigen::Index(m.time.size()), count = m.q.cols();
-  const bool tilts = freedom_.tilt && motion.marked;
+  const bool tilts = freedom_.tilt && motion.marked();
   const Eigen::MatrixXd load =
       something_follows_load() ? chain_torque(state, motion) : Eigen::MatrixXd::Zero(n, count);
   std::vector<Eigen::MatrixXd> tilt(tilts ? 3 : 0, Eigen::MatrixXd(n, count));
@@ -163,7 +166,7 @@ void FitModel::add_effects(const State& state, const FittedMotion& motion, const
     for (const JointEffect& e : rig_.joints[j].effects)
       all[j].predicted += columns(e, j) * e.values.head(e.spec().columns);
   for (std::size_t i = 0; i < freedom_.effects.size(); ++i) {
-    if (!freedom_.effects[i].everywhere && !motion.marked) continue;
+    if (!freedom_.effects[i].everywhere && !motion.marked()) continue;
     const std::size_t j = freedom_.effects[i].joint;
     JointEffect e = state.effects[i];
     const JointEffectSpec& spec = e.spec();
@@ -188,8 +191,9 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
                            const Eigen::VectorXd& load, const Eigen::MatrixXd& tilt) const {
   const ArmMotion& m = *motion.motion;
   const auto c = Eigen::Index(j);
-  const Layout at{Eigen::Index(rig_.joints.size())};
-  const bool carries = freedom_.payload && motion.marked, rubs = freedom_.friction && motion.marked,
+  const Layout at = layout_of(rig_, freedom_);
+  const Eigen::Index s = Eigen::Index(motion.state) - 1;
+  const bool carries = freedom_.payload && motion.marked(), rubs = freedom_.friction && motion.marked(),
              tilts = tilt.cols() > 0;
   const double factor = this->factor(state, j);
   Linearised out;
@@ -205,10 +209,10 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
   if (rubs)
     for (const DriveTerm t :
          {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
-      kept[int(t)] *= std::exp(state.friction[c]);
-  const Chain chain = this->chain(state, motion.marked);
+      kept[int(t)] *= std::exp(state.friction(c, s));
+  const Chain chain = this->chain(state, motion.state);
   out.predicted = drive * kept;
-  if (rubs) out.predicted.array() += state.shift[c];
+  if (rubs) out.predicted.array() += state.shift(c, s);
   for (Eigen::Index i = 0; i < at.joints; ++i)
     out.predicted += m.chain[j].middleCols(10 * i, 10) * chain.links[std::size_t(i)];
   if (tilts) out.predicted += tilt.col(2);  // the chain's columns know no tilt
@@ -223,7 +227,7 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
   if (carries) {
     out.sensitivity.middleCols(next, 10) =
         freedom_.payload_sign * factor * m.chain[j].middleCols(10 * Eigen::Index(*freedom_.payload), 10);
-    for (Eigen::Index i = 0; i < 10; ++i) out.unknowns.push_back(at.payload() + i);
+    for (Eigen::Index i = 0; i < 10; ++i) out.unknowns.push_back(at.payload(s) + i);
     next += 10;
   }
   for (Eigen::Index i = 0; tilts && i < 2; ++i, ++next) {
@@ -234,9 +238,9 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
     Eigen::VectorXd part = kept;
     part[int(DriveTerm::rotor_inertia)] = part[int(DriveTerm::offset)] = 0;
     out.sensitivity.col(next) = factor * (drive * part);
-    out.unknowns.push_back(at.friction(c));
+    out.unknowns.push_back(at.friction(c, s));
     out.sensitivity.col(next + 1).setConstant(factor);
-    out.unknowns.push_back(at.shift(c));
+    out.unknowns.push_back(at.shift(c, s));
   }
   return out;
 }

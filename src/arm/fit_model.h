@@ -16,23 +16,23 @@ constexpr Eigen::Index kEffectUnknowns = 3;               // two values, shape
 /// All that a fit may change.
 struct State {
   std::vector<BodyParameters> links;
-  BodyParameters payload = BodyParameters::Zero();  // of the body, without the sign
-  Eigen::Vector2d tilt = Eigen::Vector2d::Zero();   // rad
-  Eigen::VectorXd friction;                         // logarithms of the factors, one per joint
-  Eigen::VectorXd shift;                            // N m, of the offsets
-  Eigen::MatrixXd drives;                           // joints x kDriveUnknowns
-  std::vector<JointEffect> effects;                 // those that are free
+  std::vector<BodyParameters> payloads;            // of the body of each marked state, without the sign
+  Eigen::Vector2d tilt = Eigen::Vector2d::Zero();  // rad
+  Eigen::MatrixXd friction;                        // logarithms of the factors, joints x marked states
+  Eigen::MatrixXd shift;                           // N m, of the offsets, joints x marked states
+  Eigen::MatrixXd drives;                          // joints x kDriveUnknowns
+  std::vector<JointEffect> effects;                // those that are free
 };
 
-/// Where the unknowns stand in one vector.
+/// Where the unknowns stand in one vector. `s` counts the marked states from 0.
 struct Layout {
-  Eigen::Index joints = 0, effects = 0;
+  Eigen::Index joints = 0, effects = 0, states = 1;
   Eigen::Index link(Eigen::Index i) const { return 10 * i; }
-  Eigen::Index payload() const { return 10 * joints; }
-  Eigen::Index tilt() const { return payload() + 10; }
-  Eigen::Index friction(Eigen::Index j) const { return tilt() + 2 + j; }
-  Eigen::Index shift(Eigen::Index j) const { return friction(joints) + j; }
-  Eigen::Index drive(Eigen::Index j) const { return shift(joints) + kDriveUnknowns * j; }
+  Eigen::Index payload(Eigen::Index s = 0) const { return 10 * (joints + s); }
+  Eigen::Index tilt() const { return payload(states); }
+  Eigen::Index friction(Eigen::Index j, Eigen::Index s = 0) const { return tilt() + 2 + s * joints + j; }
+  Eigen::Index shift(Eigen::Index j, Eigen::Index s = 0) const { return friction(j, states + s); }
+  Eigen::Index drive(Eigen::Index j) const { return shift(0, states) + kDriveUnknowns * j; }
   Eigen::Index kappa(Eigen::Index j) const { return drive(j) + Eigen::Index(kDriveTerms); }
   Eigen::Index delay(Eigen::Index j) const { return kappa(j) + 1; }
   Eigen::Index effect(Eigen::Index i) const { return drive(joints) + kEffectUnknowns * i; }
@@ -65,7 +65,7 @@ class FitModel {
                                  const ArmMotion& motion, const Eigen::MatrixXd& chain,
                                  const std::vector<Eigen::VectorXd>& drives) const;
   std::vector<Linearised> linearised(const State& state, const FittedMotion& motion) const;
-  Chain chain(const State& state, bool marked) const;
+  Chain chain(const State& state, std::size_t of) const;
 
  private:
   /// `tilt`: of the tilt's sensitivity, and what the tilt of the state adds to the torque; empty without.
@@ -76,7 +76,7 @@ class FitModel {
   bool something_follows_load() const;
   double factor(const State& state, std::size_t j) const;  // channel per torque
   const ArmRig& rig_;
-  const FitFreedom& freedom_;
+  const FitFreedom freedom_;  // its own: callers give `{}`
 };
 
 /// What a fit has found.

@@ -39,6 +39,7 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
                const std::vector<char>& moves)
     : layout_(layout_of(rig, freedom)),
       weight_(settings.declared_weight),
+      weights_(freedom.weights),
       mass_(settings.payload_mass),
       radius_(settings.payload_radius),
       shift_(settings.day_shift),
@@ -46,9 +47,14 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
   if (freedom.links)
     for (std::size_t i = 0; i < rig.chain.size(); ++i)
       bodies_.push_back({layout_.link(Eigen::Index(i)), inverse(pseudo_inertia(rig.chain.links[i]))});
-  if (payload_) bodies_.push_back({layout_.payload(), Eigen::Matrix4d::Identity()});
+  for (Eigen::Index s = 0; payload_ && s < layout_.states; ++s)
+    bodies_.push_back({layout_.payload(s), Eigen::Matrix4d::Identity()});
+  for (std::size_t s = 0; s < weights_.size(); ++s)
+    if (const double error = weights_[s].standard_error; std::isfinite(error))
+      normal_.push_back({layout_.payload(Eigen::Index(s)), weights_[s].value, 1 / (error * error)});
   for (Eigen::Index i = 0; freedom.tilt && i < 2; ++i)
     normal_.push_back({layout_.tilt() + i, 0, 1 / (kTilt * kTilt)});
+  std::vector<double> own;  // variances of the constants
   for (std::size_t j = 0; j < rig.joints.size(); ++j) {
     const auto c = Eigen::Index(j);
     if (!moves[j]) continue;
@@ -65,7 +71,8 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
     }
     if (freedom.drives) normal_.push_back({layout_.delay(c), drive.delay, 1 / (kDelayError * kDelayError)});
     if (freedom.friction) {
-      normal_.push_back({layout_.friction(c), 0, 1 / (settings.day * settings.day)});
+      for (Eigen::Index s = 0; s < layout_.states; ++s)
+        normal_.push_back({layout_.friction(c, s), 0, 1 / (settings.day * settings.day)});
       day_.push_back(c);
     }
     if (freedom.load && !freedom.drives && drive.load_error > 0) {
@@ -74,9 +81,13 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
           {place, drive.terms[std::size_t(DriveTerm::load)], 1 / (drive.load_error * drive.load_error)});
       if (!freedom.of_drive(j)) positive_.push_back({place, drive.terms[std::size_t(DriveTerm::load)]});
     }
-    if (freedom.constants && drive.constant_error > 0)
-      normal_.push_back({layout_.kappa(c), 0, 1 / (drive.constant_error * drive.constant_error)});
+    if (freedom.constants && drive.constant_error > 0) {
+      kappas_.push_back(layout_.kappa(c));
+      own.push_back(drive.constant_error * drive.constant_error);
+    }
   }
+  // Links that are known hold what all constants have in common: then it is no unknown of the fit.
+  set_constants(own, freedom.links ? rig.common_error : 0);
   for (std::size_t i = 0; i < freedom.effects.size(); ++i) {
     const FreeEffect& e = freedom.effects[i];
     if (e.effect.spec().has_shape())
@@ -85,14 +96,24 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
   }
 }
 
+/// The precision of all constants together: variances of each, and the error that they share.
+void Priors::set_constants(const std::vector<double>& own, double common) {
+  const auto n = Eigen::Index(own.size());
+  Eigen::MatrixXd together = Eigen::MatrixXd::Constant(n, n, common * common);
+  for (Eigen::Index i = 0; i < n; ++i) together(i, i) += own[std::size_t(i)];
+  if (n > 0) kappa_precision_ = signal::symmetric_inverse(together);
+}
+
 Eigen::VectorXd Priors::vector_of(const State& state) const {
   Eigen::VectorXd x = Eigen::VectorXd::Zero(layout_.size());
   for (Eigen::Index i = 0; i < layout_.joints; ++i)
     x.segment<10>(layout_.link(i)) = state.links[std::size_t(i)];
-  x.segment<10>(layout_.payload()) = state.payload;
   x.segment<2>(layout_.tilt()) = state.tilt;
-  x.segment(layout_.friction(0), layout_.joints) = state.friction;
-  x.segment(layout_.shift(0), layout_.joints) = state.shift;
+  for (Eigen::Index s = 0; s < layout_.states; ++s) {
+    x.segment<10>(layout_.payload(s)) = state.payloads[std::size_t(s)];
+    x.segment(layout_.friction(0, s), layout_.joints) = state.friction.col(s);
+    x.segment(layout_.shift(0, s), layout_.joints) = state.shift.col(s);
+  }
   for (Eigen::Index j = 0; j < layout_.joints; ++j)
     x.segment(layout_.drive(j), kDriveUnknowns) = state.drives.row(j).transpose();
   for (std::size_t i = 0; i < state.effects.size(); ++i)
@@ -102,11 +123,11 @@ Eigen::VectorXd Priors::vector_of(const State& state) const {
 }
 
 void Priors::begin(State& state) {
-  if (payload_) {
+  for (std::size_t s = 0; payload_ && s < state.payloads.size(); ++s) {
     Body ball;
-    ball.mass = mass_;
-    ball.inertia = 2 * kBall * mass_ * radius_ * radius_ * Eigen::Matrix3d::Identity();
-    state.payload = parameters_of(ball);
+    ball.mass = s < weights_.size() && std::isfinite(weights_[s].standard_error) ? weights_[s].value : mass_;
+    ball.inertia = 2 * kBall * ball.mass * radius_ * radius_ * Eigen::Matrix3d::Identity();
+    state.payloads[s] = parameters_of(ball);
   }
   for (const Positive& p : positive_) {
     const Eigen::Index j = (p.place - layout_.drive(0)) / kDriveUnknowns,
@@ -130,6 +151,9 @@ double Priors::value(const Eigen::VectorXd& x) const {
     sum += weight_ * (ratio - std::log(ratio));
   }
   for (const Normal& n : normal_) sum += 0.5 * n.weight * (x[n.place] - n.centre) * (x[n.place] - n.centre);
+  for (std::size_t i = 0; i < kappas_.size(); ++i)
+    for (std::size_t k = 0; k < kappas_.size(); ++k)
+      sum += 0.5 * x[kappas_[i]] * kappa_precision_(Eigen::Index(i), Eigen::Index(k)) * x[kappas_[k]];
   return sum;
 }
 
@@ -154,6 +178,12 @@ void Priors::add_derivatives(const Eigen::VectorXd& x, Eigen::VectorXd& gradient
     gradient[n.place] += n.weight * (x[n.place] - n.centre);
     curvature(n.place, n.place) += n.weight;
   }
+  for (std::size_t i = 0; i < kappas_.size(); ++i)
+    for (std::size_t k = 0; k < kappas_.size(); ++k) {
+      const double precision = kappa_precision_(Eigen::Index(i), Eigen::Index(k));
+      gradient[kappas_[i]] += precision * x[kappas_[k]];
+      curvature(kappas_[i], kappas_[k]) += precision;
+    }
 }
 
 Eigen::MatrixXd Priors::curvature(const State& state) const {
@@ -166,18 +196,20 @@ Eigen::MatrixXd Priors::curvature(const State& state) const {
 void Priors::follow(const Eigen::VectorXd& x) {
   for (Divergence& d : bodies_) {
     const Eigen::Matrix4d p = pseudo_inertia(x.segment<10>(d.place));
-    if (payload_ && d.place == layout_.payload())
+    if (d.place >= layout_.payload())
       d.inverse = inverse(p);
     else
       d.inverse *= 4 / (d.inverse * p).trace();
   }
   for (Positive& p : positive_) p.reference = x[p.place];
+  const Eigen::Index first = layout_.shift(0), last = layout_.shift(0, layout_.states);
+  normal_.erase(std::remove_if(normal_.begin(), normal_.end(),
+                               [&](const Normal& n) { return n.place >= first && n.place < last; }),
+                normal_.end());
   for (const Eigen::Index j : day_) {
     const double size = shift_ * x[layout_.drive(j) + Eigen::Index(DriveTerm::coulomb)];
-    normal_.erase(std::remove_if(normal_.begin(), normal_.end(),
-                                 [&](const Normal& n) { return n.place == layout_.shift(j); }),
-                  normal_.end());
-    if (size > 0) normal_.push_back({layout_.shift(j), 0, 1 / (size * size)});
+    for (Eigen::Index s = 0; size > 0 && s < layout_.states; ++s)
+      normal_.push_back({layout_.shift(j, s), 0, 1 / (size * size)});
   }
 }
 
@@ -222,49 +254,6 @@ Eigen::VectorXd Priors::step(const Eigen::MatrixXd& h, const Eigen::VectorXd& g,
     best = objective(x);
   }
   return x;
-}
-
-std::vector<BaseParameter> base_parameters(const ArmRig& rig, const std::vector<FittedMotion>& motions,
-                                           const State& state, const Eigen::MatrixXd& covariance) {
-  constexpr double kTold = 1e-4;  // choice: of a column's size, below which the motions do not show it
-  static const std::array<const char*, 10> names = {"mass",       "moment_x",   "moment_y",   "moment_z",
-                                                    "inertia_xx", "inertia_xy", "inertia_xz", "inertia_yy",
-                                                    "inertia_yz", "inertia_zz"};
-  static const std::array<const char*, 10> units = {"kg",     "kg m",   "kg m",   "kg m",   "kg m^2",
-                                                    "kg m^2", "kg m^2", "kg m^2", "kg m^2", "kg m^2"};
-  const Eigen::Index size = 10 * Eigen::Index(rig.chain.size());
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(size, size);
-  for (const FittedMotion& m : motions)
-    for (const Eigen::MatrixXd& y : m.motion->chain) gram += signal::gram(y);
-  Eigen::VectorXd theta(size);
-  for (std::size_t i = 0; i < state.links.size(); ++i)
-    theta.segment<10>(10 * Eigen::Index(i)) = state.links[i];
-  const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt();
-  std::vector<Eigen::Index> kept;  // a column that is no combination of those before it
-  Eigen::MatrixXd left = gram;
-  for (Eigen::Index i = 0; i < size; ++i) {
-    if (!(left(i, i) > kTold * kTold * scale[i] * scale[i]) || scale[i] == 0) continue;
-    kept.push_back(i);
-    left = (left - left.col(i) * left.row(i) / left(i, i)).eval();
-  }
-  const auto n = Eigen::Index(kept.size());
-  Eigen::MatrixXd own(n, n), cross(n, size);
-  for (Eigen::Index r = 0; r < n; ++r)
-    for (Eigen::Index c = 0; c < size; ++c) {
-      cross(r, c) = gram(kept[std::size_t(r)], c);
-      for (Eigen::Index k = 0; k < n; ++k) own(r, k) = gram(kept[std::size_t(r)], kept[std::size_t(k)]);
-    }
-  const Eigen::MatrixXd regroup = signal::solve_symmetric(own, cross);
-  const Eigen::VectorXd values = regroup * theta;
-  const Eigen::MatrixXd spread = regroup * covariance.topLeftCorner(size, size) * regroup.transpose();
-  std::vector<BaseParameter> base;
-  for (Eigen::Index r = 0; r < n; ++r) {
-    const auto i = std::size_t(kept[std::size_t(r)]);
-    base.push_back({rig.chain.joints[i / 10].link + "/" + names[i % 10],
-                    {values[r], std::sqrt(std::max(0.0, spread(r, r)))},
-                    units[i % 10]});
-  }
-  return base;
 }
 
 }  // namespace backlash::arm

@@ -45,20 +45,20 @@ class Priors {
   void add_derivatives(const Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& curvature) const;
   Eigen::VectorXd vector_of(const State& state) const;
   void follow(const Eigen::VectorXd& x);
+  void set_constants(const std::vector<double>& own, double common);
 
   Layout layout_;
   double weight_ = 1;
-  double mass_ = 1, radius_ = 0.1;  // kg, m, of a payload to start from
-  double shift_ = 0.1;              // of offsets, per Coulomb friction
-  std::vector<Eigen::Index> day_;   // joints whose friction is of another day
-  bool payload_ = false;
+  std::vector<signal::Measured> weights_;  // kg, of the bodies
+  double mass_ = 1, radius_ = 0.1;         // kg, m, of a payload to start from
+  double shift_ = 0.1;                     // of offsets, per Coulomb friction
+  std::vector<Eigen::Index> day_;          // joints whose friction is of another day
+  bool payload_ = false;                   // there is one per marked state
   std::vector<Divergence> bodies_;
   std::vector<Positive> positive_;
   std::vector<Normal> normal_;
+  std::vector<Eigen::Index> kappas_;  // of the constants that are not exact
+  Eigen::MatrixXd kappa_precision_;   // of all of them together
 };
-
-/// What of the links' standard parameters the motions tell apart (Gautier 1991, J. Robotic Systems 8:485).
-std::vector<BaseParameter> base_parameters(const ArmRig& rig, const std::vector<FittedMotion>& motions,
-                                           const State& state, const Eigen::MatrixXd& covariance);
 
 }  // namespace backlash::arm

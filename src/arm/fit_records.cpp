@@ -102,6 +102,58 @@ void warn_of_misfit(ArmFit& fit) {
                       fit.rig.joints[j].name, 100 * fit.train[j], 100 * fit.floor[j]));
 }
 
+constexpr double kExact = 1e-4;  // of a mass that is stated as exact; choice: far below what any torque shows
+constexpr double kFarFromDeclared = 3;  // standard errors of the declared scale; choice
+
+bool carries(const std::vector<std::optional<Carried>>& carried, std::size_t record) {
+  return record < carried.size() && carried[record].has_value();
+}
+
+/// The same with what some records carry at the last link.
+ArmFit fit_loaded(const ArmRig& rig, std::vector<RecordMotions> records,
+                  const std::vector<std::optional<Carried>>& carried, const FitSettings& settings,
+                  const Progress& progress) {
+  FitFreedom freedom;
+  freedom.payload = rig.chain.size() - 1;
+  freedom.friction = true;
+  std::vector<FittedMotion> motions;
+  bool weighed = false;
+  for (std::size_t r = 0; r < records.size(); ++r) {
+    if (carries(carried, r)) {
+      signal::Measured mass = carried[r]->mass;
+      weighed = weighed || std::isfinite(mass.standard_error);
+      if (mass.standard_error < kExact * mass.value) mass.standard_error = kExact * mass.value;
+      freedom.weights.push_back(mass);
+    }
+    for (ArmMotion& m : records[r]) {
+      set_friction_speeds(m, rig);
+      motions.push_back({&m, carries(carried, r) ? freedom.weights.size() : 0});
+    }
+  }
+  ArmFit fit = fit_arm(rig, motions, freedom, settings, progress);
+  fit.weighed = weighed;
+  return fit;
+}
+
+/// A weight that contradicts the declared constants may be another one, or of another record.
+void warn_of_scale(const ArmRig& declared, ArmFit& fit) {
+  double sum = 0, own = 0, count = 0;
+  for (std::size_t j = 0; j < declared.joints.size(); ++j) {
+    const double error = declared.joints[j].constant_error;
+    if (!(error > 0) || !std::isfinite(fit.train[j])) continue;
+    sum += std::log(fit.rig.joints[j].constant / declared.joints[j].constant);
+    own += error * error, count += 1;
+  }
+  if (!(count > 0)) return;
+  const double scale = std::exp(sum / count),
+               error = std::hypot(declared.common_error, std::sqrt(own) / count);
+  if (std::fabs(std::log(scale)) > kFarFromDeclared * error)
+    fit.warnings.push_back(fmt::format(
+        "by the weight the torque constants are {:.3g} times the declared ones, which are known to "
+        "{:.2g} %: look whether the weight is right, and of this record",
+        scale, 100 * error));
+}
+
 }  // namespace
 
 std::vector<Contradiction> contradictions(const ArmFit& together, const std::vector<ArmFit>& alone) {
@@ -128,11 +180,25 @@ std::string description(const std::vector<Contradiction>& all) {
 }
 
 ArmFit fit_records(const ArmRig& declared, const std::vector<RecordMotions>& records,
-                   const FitSettings& settings, const Progress& progress) {
+                   const FitSettings& settings, const Progress& progress,
+                   const std::vector<std::optional<Carried>>& carried) {
   ArmRig rig = declared;
   RecordMotions motions;
-  for (const RecordMotions& record : records) motions.insert(motions.end(), record.begin(), record.end());
+  for (std::size_t r = 0; r < records.size(); ++r)
+    if (!carries(carried, r)) motions.insert(motions.end(), records[r].begin(), records[r].end());
+  if (motions.empty())
+    throw CannotIdentify(
+        "all records carry something: what the arm is without it takes at least one record without a "
+        "payload");
   ArmFit fit = fit_arm_and_friction_speeds(rig, motions, settings, progress);
+  if (std::any_of(carried.begin(), carried.end(), [](const auto& c) { return c.has_value(); })) {
+    const std::vector<std::string> before = std::move(fit.warnings);
+    fit = fit_loaded(rig, records, carried, settings, progress);
+    for (const std::string& warning : before)
+      if (std::find(fit.warnings.begin(), fit.warnings.end(), warning) == fit.warnings.end())
+        fit.warnings.push_back(warning);
+    if (fit.weighed) warn_of_scale(declared, fit);
+  }
   require_rubbing(fit, motions);
   warn_of_misfit(fit);
   if (records.size() < 2 || records.size() > kMostRecords) return fit;

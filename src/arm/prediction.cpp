@@ -12,12 +12,14 @@ namespace backlash::arm {
 
 State state_of(const ArmFit& fit, const FitFreedom& freedom) {
   State state = FitModel(fit.rig, freedom).start();
-  state.payload = freedom.payload_sign * fit.payload;
   if (freedom.tilt) state.tilt = {fit.tilt[0].value, fit.tilt[1].value};
-  if (freedom.friction)
-    for (std::size_t j = 0; j < fit.friction_factors.size(); ++j)
-      state.friction[Eigen::Index(j)] = std::log(fit.friction_factors[j].value),
-      state.shift[Eigen::Index(j)] = fit.shifts[j];
+  for (std::size_t s = 0; s < state.payloads.size() && s < fit.states.size(); ++s) {
+    const FittedState& own = fit.states[s];
+    state.payloads[s] = freedom.payload_sign * own.payload;
+    for (std::size_t j = 0; freedom.friction && j < own.friction_factors.size(); ++j)
+      state.friction(Eigen::Index(j), Eigen::Index(s)) = std::log(own.friction_factors[j].value),
+                                      state.shift(Eigen::Index(j), Eigen::Index(s)) = own.shifts[j];
+  }
   for (std::size_t i = 0; i < state.effects.size(); ++i) state.effects[i] = fit.effects[i].effect;
   return state;
 }
@@ -69,7 +71,7 @@ double of_couplings(const ArmFit& fit, const FitFreedom& freedom, const FittedMo
   double sum = 0;
   for (std::size_t e = 0; e < freedom.effects.size(); ++e) {
     const FreeEffect& free = freedom.effects[e];
-    if (free.joint != j || !is_coupling(free.effect) || (!free.everywhere && !m.marked)) continue;
+    if (free.joint != j || !is_coupling(free.effect) || (!free.everywhere && !m.marked())) continue;
     const std::size_t i = *index_of(fit.rig, free.effect.other);
     const JointDrive& other = fit.rig.joints[i];
     const double torque = m.motion->counts(row, Eigen::Index(i))

@@ -133,7 +133,12 @@ std::vector<PushEvent> pushes(const ArmRecord& record, const ArmRig& rig, const 
     if (!holds(joint, settings) || joint.time.back() - joint.time.front() < 3 * settings.quiet) continue;
     const Hold h = hold_of(joint, rig.channel, settings);
     if (!(h.noise > 0)) continue;  // a constant: no sensor
-    for (const PushEvent& e : events(h, j, rig.joints[j].constant, settings)) all.push_back(e);
+    const JointDrive& drive = rig.joints[j];
+    const double scale = std::hypot(rig.common_error, drive.constant_error);
+    for (PushEvent e : events(h, j, drive.constant, settings)) {
+      e.torque_error = std::hypot(e.torque_error, scale * e.torque);
+      all.push_back(e);
+    }
   }
   std::stable_sort(all.begin(), all.end(), [](const PushEvent& a, const PushEvent& b) {
     return a.begin != b.begin ? a.begin < b.begin : a.clear > b.clear;

@@ -125,7 +125,7 @@ void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
   trace_.notes.push_back(fmt::format(
       "a body that is gone does nearly as well as one that has come: {:.3g} kg; motion with faster turns, or "
       "other poses, would tell them apart",
-      rival.fit.mass.value));
+      rival.fit.marked().mass.value));
 }
 
 /// Where friction is not that of the training: a step where it is more than a robot's warming up, else a
@@ -138,7 +138,7 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged, const Fric
   const std::vector<double> expected = fits_.foretold(c, judged),
                             errors = relative_errors(c.fit, c.freedom, as_fitted(judged, true), 0);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
-    const signal::Measured& f = c.fit.friction_factors[j];
+    const signal::Measured& f = c.fit.marked().friction_factors[j];
     if (!(std::fabs(f.value - 1) > settings_.sure * f.standard_error)) continue;
     const bool much = other_friction_than_trained(c.fit, j, settings_);
     const std::string words =
@@ -180,6 +180,12 @@ void Tracer::tell_chain(const std::vector<Candidate>& all, std::size_t best, con
   for (const std::string& name : as_good_as(all, best, settings_)) step.equivalent_to.push_back(name);
   trace_.steps.push_back(step);
   if (of_joint(told)) tell_when(told);
+  const double common = rig_.fitted ? rig_.common_error : last.fit.rig.common_error;
+  if (told.freedom.payload && common > 0)
+    trace_.notes.push_back(fmt::format(
+        "the mass has the scale of the torque constants, which all together are known to {:.2g} %, "
+        "as its error holds; a known weight measures them (identify --payload)",
+        100 * common));
   for (const Candidate& c : all)
     if (c.reason.empty() && told.freedom.payload && c.freedom.payload &&
         *c.freedom.payload != *told.freedom.payload && told.all - c.all < -std::log(1 - settings_.same_link))

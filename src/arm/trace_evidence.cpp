@@ -147,7 +147,7 @@ double errors_from_none(const Candidate& c, const ArmFit& fit) {
     return standard_errors_from_none(e.effect.values.head(e.effect.spec().columns), e.covariance, 0);
   }
   if (c.freedom.payload)  // of mass and moments together: an arm may tell the moments only
-    return standard_errors_from_none(fit.payload.head<4>(), fit.covariance, layout.payload());
+    return standard_errors_from_none(fit.marked().payload.head<4>(), fit.covariance, layout.payload());
   const Eigen::Vector2d tilt(fit.tilt[0].value, fit.tilt[1].value);
   return standard_errors_from_none(tilt, fit.covariance, layout.tilt());
 }
@@ -162,7 +162,7 @@ void judge(Candidate& c, const Candidate& without, const Motions& judged, const 
 }
 
 bool other_friction_than_trained(const ArmFit& fit, std::size_t joint, const ArmTraceSettings& settings) {
-  const signal::Measured& f = fit.friction_factors[joint];
+  const signal::Measured& f = fit.marked().friction_factors[joint];
   return std::fabs(f.value - 1) > settings.sure * f.standard_error &&
          std::fabs(f.value - 1) > settings.least_friction;
 }
@@ -228,7 +228,7 @@ std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
     if (!(errors > settings.sure))
       return fmt::format(
           "its mass and moments are {:.1f} standard errors from none: mass {:.2g} +- {:.1g} kg", errors,
-          c.fit.mass.value, c.fit.mass.standard_error);
+          c.fit.marked().mass.value, c.fit.marked().mass.standard_error);
   }
   if (c.freedom.tilt) {
     // A planar arm tells the tilt about one axis only.

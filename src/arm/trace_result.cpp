@@ -89,12 +89,12 @@ ArmStep step_of(const Candidate& named, const ArmFit& fit, const ArmRig& rig, do
   step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
   if (c.freedom.payload) {
     step.link = rig.chain.joints[*c.freedom.payload].link;
-    const double mass = c.fit.mass.value;
-    const double error = rig.fitted ? std::hypot(c.fit.mass.standard_error, mass * rig.common_error)
-                                    : c.fit.mass.standard_error;
+    const double mass = c.fit.marked().mass.value;
+    const double error = rig.fitted ? std::hypot(c.fit.marked().mass.standard_error, mass * rig.common_error)
+                                    : c.fit.marked().mass.standard_error;
     step.parameters.push_back({"mass", "kg", {mass, error}});
     static const char* const names[] = {"centre_x", "centre_y", "centre_z"};
-    for (int i = 0; i < 3; ++i) step.parameters.push_back({names[i], "m", c.fit.centre[i]});
+    for (int i = 0; i < 3; ++i) step.parameters.push_back({names[i], "m", c.fit.marked().centre[i]});
   } else {
     step.parameters = {{"about_x", "rad", c.fit.tilt[0]}, {"about_y", "rad", c.fit.tilt[1]}};
   }
@@ -106,15 +106,15 @@ ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken) {
   ArmRig out = taken.fit.rig;
   if (freedom.payload)
     out.payloads.push_back({rig.chain.joints[*freedom.payload].link, freedom.payload_sign,
-                            BodyParameters(freedom.payload_sign * taken.fit.payload)});
+                            BodyParameters(freedom.payload_sign * taken.fit.marked().payload)});
   if (freedom.tilt)
     out.chain.gravity =
         tilted(taken.fit.rig.chain.gravity, {taken.fit.tilt[0].value, taken.fit.tilt[1].value});
   for (std::size_t j = 0; j < rig.joints.size(); ++j) {
-    out.joints[j].terms[std::size_t(DriveTerm::offset)] += taken.fit.shifts[j];
+    out.joints[j].terms[std::size_t(DriveTerm::offset)] += taken.fit.marked().shifts[j];
     for (const DriveTerm t :
          {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
-      out.joints[j].terms[std::size_t(t)] *= taken.fit.friction_factors[j].value;
+      out.joints[j].terms[std::size_t(t)] *= taken.fit.marked().friction_factors[j].value;
   }
   for (std::size_t i = 0; i < freedom.effects.size(); ++i)
     out.joints[freedom.effects[i].joint].effects.push_back(taken.fit.effects[i].effect);

@@ -70,10 +70,80 @@ report::Json body_json(const arm::BodyParameters& parameters) {
           {"consistent", arm::is_consistent(parameters)}};
 }
 
+/// A record in which the machine carried something, and what.
+struct LoadedRecord {
+  std::string record;
+  bool known;
+  const arm::FittedState* state;
+};
+
+std::vector<LoadedRecord> loaded_records(const arm::ArmFit& fit, const std::vector<std::string>& records,
+                                         const Carried& carried) {
+  std::vector<LoadedRecord> all;
+  for (std::size_t r = 0; r < carried.size(); ++r)
+    if (carried[r])
+      all.push_back({records[r], std::isfinite(carried[r]->mass.standard_error), &fit.states[all.size()]});
+  return all;
+}
+
+bool has_inexact_constants(const arm::ArmRig& rig) {
+  return std::any_of(rig.joints.begin(), rig.joints.end(),
+                     [](const arm::JointDrive& drive) { return drive.constant_error > 0; });
+}
+
+std::string scale_sentence(const arm::ArmFit& fit) {
+  const double percent = 100 * fit.rig.common_error;
+  if (fit.weighed)
+    return fmt::format(
+        "the known weight has measured the torque constants, all together to {:.2g} %; masses and "
+        "inertias are as well known",
+        percent);
+  if (!has_inexact_constants(fit.rig))
+    return "of the recorded torque, or of constants that are declared as exact";
+  return fmt::format(
+      "of the declared torque constants: the records do not show how large all of them are together, "
+      "which is known to {:.2g} %; all torques, masses and inertias share that. A record with a "
+      "known weight measures it: --payload",
+      percent);
+}
+
+report::Json payloads_json(const arm::ArmFit& fit, const std::vector<LoadedRecord>& loaded) {
+  report::Json all = report::Json::array();
+  for (const LoadedRecord& l : loaded) {
+    report::Json one = {{"record", l.record},
+                        {"link", fit.rig.chain.joints.back().link},
+                        {"known", l.known},
+                        {"mass", with_unit(l.state->mass, "kg")}};
+    static const char* const names[] = {"centre_x", "centre_y", "centre_z"};
+    for (int i = 0; i < 3; ++i) one[names[i]] = with_unit(l.state->centre[i], "m");
+    one["body"] = body_json(l.state->payload);
+    all.push_back(one);
+  }
+  return all;
+}
+
+/// Standard parameters that no motion distinguishes from others, or shows at all: any value would do, the
+/// interval is infinite.
+report::Json not_identifiable_json(const arm::ArmFit& fit) {
+  report::Json all = report::Json::object();
+  for (std::size_t i = 0; i < fit.rig.shown.size(); ++i) {
+    if (fit.rig.shown[i] == arm::Shown::leads) continue;
+    all[arm::standard_name(fit.rig.chain, i)] = {
+        {"value", fit.rig.chain.links[i / 10][Eigen::Index(i % 10)]},
+        {"interval", nullptr},
+        {"reason",
+         fit.rig.shown[i] == arm::Shown::not_at_all
+             ? "no motion shows it: as declared where a body allows that"
+             : "the motions show it in a sum with others only: as near to the declared body as that sum "
+               "allows"}};
+  }
+  return all;
+}
+
 }  // namespace
 
 std::string arm_identification_json(const arm::ArmFit& fit, const std::string& rig,
-                                    const std::vector<std::string>& records) {
+                                    const std::vector<std::string>& records, const Carried& carried) {
   report::Json json = {{"schema_version", 1},
                        {"version", version()},
                        {"procedures", report::Json::array()},
@@ -92,7 +162,11 @@ std::string arm_identification_json(const arm::ArmFit& fit, const std::string& r
     json["channels"][torque_channel(fit.rig.joints[j].name)] = {{"train", report::json_number(fit.train[j])},
                                                                 {"floor", report::json_number(fit.floor[j])}};
   json["several_machines"] = contradictions_json(fit.contradictions);
-  json["common_scale"] = {{"uncertainty", fit.rig.common_error}};
+  json["common_scale"] = {{"uncertainty", fit.rig.common_error},
+                          {"from", fit.weighed ? "weight" : "declared"},
+                          {"message", scale_sentence(fit)}};
+  json["payloads"] = payloads_json(fit, loaded_records(fit, records, carried));
+  json["not_identifiable"] = not_identifiable_json(fit);
   for (std::size_t i = 0; i < fit.rig.chain.size(); ++i)
     json["links"][fit.rig.chain.joints[i].link] = body_json(fit.rig.chain.links[i]);
   json["rig"] = rig;
@@ -100,7 +174,8 @@ std::string arm_identification_json(const arm::ArmFit& fit, const std::string& r
   return report::dumped(json, 1);
 }
 
-void print_arm_summary(const arm::ArmFit& fit, std::ostream& out) {
+void print_arm_summary(const arm::ArmFit& fit, const std::vector<std::string>& records,
+                       const Carried& carried, std::ostream& out) {
   out << "parameters (at the joints)\n";
   for (const NamedValue& v : drive_values(fit))
     out << fmt::format("  {:<36} {:12.6g}  +- {:<9.2g} {}\n", v.name, v.measured.value,
@@ -113,6 +188,15 @@ void print_arm_summary(const arm::ArmFit& fit, std::ostream& out) {
     out << fmt::format("  {:<24} {:8.4g} kg at {:8.4f} {:8.4f} {:8.4f} m\n", fit.rig.chain.joints[i].link,
                        b.mass, b.centre.x(), b.centre.y(), b.centre.z());
   }
+  const auto hidden = std::count(fit.rig.shown.begin(), fit.rig.shown.end(), arm::Shown::not_at_all),
+             mixed = std::count(fit.rig.shown.begin(), fit.rig.shown.end(), arm::Shown::in_others);
+  out << fmt::format(
+      "  {} of their {} values no motion shows, {} only in a sum with others (not_identifiable)\n", hidden,
+      fit.rig.shown.size(), mixed);
+  for (const LoadedRecord& l : loaded_records(fit, records, carried))
+    out << fmt::format("\ncarried in {}: {} kg, {}\n", l.record, signal::with_error(l.state->mass),
+                       l.known ? "known" : "found");
+  out << "\nscale: " << scale_sentence(fit) << '\n';
   out << "\nrelative error of the fitted model (what noise alone would leave)\n";
   for (std::size_t j = 0; j < fit.rig.joints.size(); ++j)
     out << fmt::format("  {:<36} {:.3g} % ({:.3g} %)\n", torque_channel(fit.rig.joints[j].name),
@@ -123,6 +207,7 @@ void print_arm_summary(const arm::ArmFit& fit, std::ostream& out) {
 std::string fitted_arm_text(const arm::ArmFit& fit, const std::vector<std::string>& records) {
   std::vector<std::string> comments = {"Fitted by identify to:"};
   for (const std::string& record : records) comments.push_back("  " + printable(record, 4096));
+  if (fit.weighed) comments.emplace_back("Torque constants: measured by a known weight (--payload).");
   comments.emplace_back(
       "Standard errors are in the JSON beside it. Links: one physical body each, of many that move alike.");
   comments.emplace_back("SPDX-License-Identifier: BSD-3-Clause");

@@ -48,6 +48,7 @@ class ArmChanges {
   bool is_left_by_chain(const ArmJoint& joint, std::size_t place, const Change& change) const;
   double left(const FoundChainChange& f) const;
   Change told(const FoundChainChange& f) const;
+  void add_scale();
 
   std::deque<ArmJoint>& joints() { return arm_->joints(); }
   const ArmJoint& first() const { return arm_->joints().front(); }
@@ -314,6 +315,17 @@ void ArmChanges::tell_deflection(std::size_t index) {
   }
 }
 
+/// A mass has the scale of the torque constants.
+void ArmChanges::add_scale() {
+  const double common = arm_->fit().rig.common_error;
+  if (common > 0 && std::any_of(chain_.begin(), chain_.end(),
+                                [](const FoundChainChange& f) { return f.effect.values > 1; }))
+    out_.warnings.push_back(
+        "the mass has the scale of the torque constants, which all together are known to " +
+        to_text(std::round(1000 * common) / 10) +
+        " %, as its error holds; a known weight measures them (identify --payload)");
+}
+
 Changes ArmChanges::run(const std::vector<arm::ArmRecord>& healthy, const arm::ArmRecord& record) {
   tell(0, "fitting the healthy arm");
   arm_.emplace(rig_, healthy, settings_, progress_, out_.warnings);
@@ -326,6 +338,7 @@ Changes ArmChanges::run(const std::vector<arm::ArmRecord>& healthy, const arm::A
   for (std::size_t j = 0; j < joints().size(); ++j) tell_joint(joints()[j], j);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) tell_deflection(j);
   for (const FoundChainChange& f : chain_) out_.changes.push_back(told(f));
+  add_scale();
   std::sort(out_.changes.begin(), out_.changes.end(),
             [](const Change& a, const Change& b) { return a.since < b.since; });
   return out_;

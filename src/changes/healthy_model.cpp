@@ -198,7 +198,7 @@ Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const C
 /// What the healthy machine leaves beside what may differ from record to record and wander within one: the
 /// noise that scores are measured by. Twice, as the first round takes the wander for noise. Of an arm, whose
 /// records are short and whose chain leaves more in another task than in those it was fitted to, all of it is
-/// noise: of the measured UR5 four of nine pairs of healthy records were told as changed otherwise.
+/// noise: of the measured UR10e four of nine pairs of healthy records were told as changed otherwise.
 void set_noise(const PooledFit& fit, const ChangeSettings& settings, HealthyModel& model) {
   model.noise = std::sqrt(fit.squares / double(fit.rows));
   if (model.sampling.chain) {

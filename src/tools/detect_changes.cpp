@@ -55,7 +55,7 @@ Command command() {
       "takes "
       "half a minute of a processor.";
   c.examples = {
-      "detect_changes --rig config/ur5_joint.yaml --healthy monday.csv tuesday.csv --json changes.json "
+      "detect_changes --rig config/ur10e_joint.yaml --healthy monday.csv tuesday.csv --json changes.json "
       "today.csv"};
   c.exit_codes =
       "  0   nothing has changed\n"

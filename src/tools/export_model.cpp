@@ -4,10 +4,12 @@
 #include <iostream>
 #include <optional>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/report/simulator_model.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/for_arm.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
@@ -17,11 +19,18 @@ Command command() {
   Command c;
   c.name = "export_model";
   c.summary =
-      "Writes the joint of a rig file as a model of other simulators: MJCF of MuJoCo, URDF or SDF. What "
-      "these "
-      "languages cannot say is named on standard error and in the file.";
-  c.positional = {"RIG.yaml"};
+      "Writes the joint of a rig file as a model of other simulators: MJCF of MuJoCo, URDF or SDF; or what "
+      "was "
+      "identified of an arm into the URDF of its robot. What these languages cannot say, and what keeps its "
+      "value, "
+      "is named on standard error.";
+  c.positional = {"[RIG.yaml]"};
   c.options = {
+      {"urdf", "ROBOT.urdf",
+       "in place of RIG.yaml: a robot's own file, in which what was identified of it is written: mass, "
+       "centre and "
+       "inertia of its links, friction and play of its joints; all else stays as it is"},
+      {"rig", "FITTED.yaml", "with --urdf: the rig file of that robot as identify has fitted it"},
       {"out", "JOINT.{xml,mjcf,urdf,sdf}", "model to write, in the language of its extension; xml is MJCF",
        true},
       {"torque", "T",
@@ -31,7 +40,8 @@ Command command() {
   c.notes =
       "One inertia, or two with a gap between them. All values are those at the load side of the reduction.";
   c.examples = {"export_model config/two_inertia_servo.yaml --out servo.xml",
-                "export_model fitted.yaml --out joint.sdf"};
+                "export_model fitted.yaml --out joint.sdf",
+                "export_model --urdf robot.urdf --rig fitted.yaml --out identified.urdf"};
   c.exit_codes = "  0   done\n";
   return c;
 }
@@ -44,7 +54,22 @@ report::SimulatorFormat format_of(const std::string& path) {
   throw UsageError("'" + printable(path, 4096) + "': a model must end in .xml, .mjcf, .urdf or .sdf");
 }
 
+int export_robot(const Arguments& arguments) {
+  if (!arguments.positionals().empty() || !arguments.has("rig"))
+    throw UsageError("--urdf needs --rig FITTED.yaml, and no RIG.yaml beside it");
+  const std::string rig = arguments.text("rig");
+  if (format_of(arguments.text("out")) != report::SimulatorFormat::urdf)
+    throw UsageError("--out: a robot's URDF becomes a URDF");
+  check_output(arguments.text("out"), {rig, arguments.text("urdf")});
+  if (!rig_file::is_arm_rig(rig)) throw BadData(rig, "is no rig file of an arm (urdf)");
+  RecordDoor door("export_model");
+  return run_for_arm(arguments, door);
+}
+
 int export_model(const Arguments& arguments) {
+  if (arguments.has("urdf")) return export_robot(arguments);
+  if (arguments.positionals().empty()) throw UsageError("missing RIG.yaml");
+  if (arguments.has("rig")) throw UsageError("--rig belongs to --urdf");
   const std::string &rig = arguments.positional(0), out = arguments.text("out");
   const report::SimulatorFormat format = format_of(out);
   check_output(out, {rig});

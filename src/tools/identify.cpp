@@ -36,6 +36,12 @@ Command command() {
       {"out", "FITTED.yaml", "the rig file with the fitted values, each with its standard error", true},
       {"json", "OUT.json", "procedures, parameters with standard errors, errors per channel, warnings", true},
       {"plot", "OUT.png", "also draw what the procedures saw"},
+      {"payload", "[RECORD=]WEIGHT",
+       "what the machine carries in the first RECORD, or in that one: \"2.805 kg +- 0.005\" (one standard "
+       "error), of a single joint \"1 kg at 0.15 m\", or unknown; may be there several times. Records "
+       "without "
+       "it carry nothing. A known weight measures the torque constants",
+       false, true},
   };
   c.notes =
       "A rig with two inertias (rigid couplings, free link) is identified from motor_torque, motor_position "
@@ -109,10 +115,12 @@ int identify_machine(const Arguments& arguments) {
   for (const std::string& path : arguments.positionals()) check_record_path(path);
   check_outputs(arguments);
   const bool is_arm = rig_file::is_arm_rig(arguments.text("rig"));
-  if (is_arm && arguments.has("plot")) throw UsageError("--plot: there is no plot for an arm");
+  if ((is_arm || arguments.has("payload")) && arguments.has("plot"))
+    throw UsageError("--plot: there is no plot for an arm, nor of a known weight");
   RecordDoor door("identify");
   try {
-    return is_arm ? run_for_arm(arguments, door) : identify_joint(arguments, door);
+    return is_arm || arguments.has("payload") ? run_for_arm(arguments, door)
+                                              : identify_joint(arguments, door);
   } catch (const CannotIdentify& error) {
     std::cerr << "identify: " << error.what() << '\n';
     identification::Identification nothing;

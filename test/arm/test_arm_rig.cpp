@@ -30,8 +30,8 @@ std::string with(std::string text, const std::string& what, const std::string& b
 class ArmRigFile : public ::testing::Test {
  protected:
   ArmRigFile() {
-    for (const char* name : {"ur5_arm.yaml", "ur5_arm.urdf"})
-      std::filesystem::copy(test::package_file(std::string("config/ur5_arm/") + name), path(name));
+    for (const char* name : {"ur10e_arm.yaml", "ur10e_arm.urdf"})
+      std::filesystem::copy(test::package_file(std::string("config/ur10e_arm/") + name), path(name));
   }
   std::string path(const std::string& name) const { return folder_.path(name); }
   std::string refusal(const std::string& rig) const {
@@ -44,25 +44,28 @@ class ArmRigFile : public ::testing::Test {
     return "accepted";
   }
   ScratchFolder folder_;
-  const std::string rig_ = text_of(test::package_file("config/ur5_arm/ur5_arm.yaml"));
-  const std::string urdf_ = text_of(test::package_file("config/ur5_arm/ur5_arm.urdf"));
+  const std::string rig_ = text_of(test::package_file("config/ur10e_arm/ur10e_arm.yaml"));
+  const std::string urdf_ = text_of(test::package_file("config/ur10e_arm/ur10e_arm.urdf"));
 };
 
 TEST_F(ArmRigFile, IsReadWithItsRobot) {
-  const ArmRig rig = load_arm_rig(path("ur5_arm.yaml"));
+  const ArmRig rig = load_arm_rig(path("ur10e_arm.yaml"));
   ASSERT_EQ(rig.chain.size(), 6u);
-  EXPECT_EQ(rig.chain.joints[2].position, Eigen::Vector3d(-0.612, 0, 0));
-  EXPECT_EQ(rig.joints[5].constant, 11.47);
+  EXPECT_EQ(rig.chain.joints[2].position, Eigen::Vector3d(-0.6127, 0, 0));
+  EXPECT_EQ(rig.joints[5].constant, 10.12);
   EXPECT_EQ(rig.joints[5].constant_error, 0.1);
+  EXPECT_EQ(rig.common_error, 0.15);
   EXPECT_FALSE(rig.fitted);
 }
 
 TEST_F(ArmRigFile, IsWrittenAsItIsRead) {
-  ArmRig rig = load_arm_rig(path("ur5_arm.yaml"));
+  ArmRig rig = load_arm_rig(path("ur10e_arm.yaml"));
   rig.fitted = true;
   rig.joints[3].terms[1] = 2.5;
   rig.joints[3].terms[6] = 0.04, rig.joints[3].load_error = 0.01;
   rig.common_error = 0.035;
+  rig.shown.assign(60, Shown::leads);
+  rig.shown[0] = Shown::not_at_all, rig.shown[19] = Shown::in_others;
   rig.payloads.push_back({"wrist_3_link", -1, rig.chain.links[5]});
   write_file(path("y.yaml"), arm_rig_text(rig, {"a comment"}));
   const ArmRig back = load_arm_rig(path("y.yaml"));
@@ -70,6 +73,7 @@ TEST_F(ArmRigFile, IsWrittenAsItIsRead) {
   EXPECT_EQ(back.joints[3].terms, rig.joints[3].terms);
   EXPECT_EQ(back.joints[3].load_error, 0.01);
   EXPECT_EQ(back.common_error, 0.035);
+  EXPECT_EQ(back.shown, rig.shown);
   ASSERT_EQ(back.payloads.size(), 1u);
   EXPECT_EQ(back.payloads[0].sign, -1);
   for (std::size_t i = 0; i < 6; ++i) EXPECT_LT((back.chain.links[i] - rig.chain.links[i]).norm(), 1e-6);
@@ -77,13 +81,13 @@ TEST_F(ArmRigFile, IsWrittenAsItIsRead) {
 }
 
 TEST_F(ArmRigFile, WrongFilesAreRefusedWithTheirPlace) {
-  EXPECT_NE(refusal(with(rig_, "ur5_arm.urdf                #", "none.urdf #")).find("none.urdf"),
+  EXPECT_NE(refusal(with(rig_, "ur10e_arm.urdf              #", "none.urdf #")).find("none.urdf"),
             std::string::npos);
   EXPECT_NE(refusal(with(rig_, "elbow_joint", "elbow")).find("no joint 'elbow'; there are: elbow_joint"),
             std::string::npos);
   EXPECT_NE(refusal(with(rig_, "gravity: [0, 0, -9.80665]", "gravity: [0, -9.8]")).find("gravity"),
             std::string::npos);
-  EXPECT_NE(refusal(with(rig_, "value: 14.87", "value: -14.87")).find("torque_constant"), std::string::npos);
+  EXPECT_NE(refusal(with(rig_, "value: 10.0,", "value: -10.0,")).find("torque_constant"), std::string::npos);
   EXPECT_NE(refusal(with(rig_, "coulomb,", "coulomp,")).find("coulomp"), std::string::npos);
   EXPECT_NE(refusal(with(rig_, "torque_cutoff", "torque_cut")).find("torque_cut"), std::string::npos);
   EXPECT_NE(refusal(with(rig_, "motor_current ", "motor_position ")).find("channel"), std::string::npos);
@@ -111,7 +115,7 @@ TEST_F(ArmRigFile, WrongEffectsOfAJointAreRefused) {
 }
 
 TEST_F(ArmRigFile, WrongRobotsAreRefused) {
-  const std::vector<std::string> joints = load_arm_rig(path("ur5_arm.yaml")).joint_names();
+  const std::vector<std::string> joints = load_arm_rig(path("ur10e_arm.yaml")).joint_names();
   const auto told = [&](const std::string& text, std::vector<std::string> names) {
     try {
       chain_of_urdf(text, "x.urdf", names);
@@ -138,20 +142,20 @@ TEST_F(ArmRigFile, WrongRobotsAreRefused) {
 TEST_F(ArmRigFile, AXacroFileIsNoUrdf) {
   const std::string macro =
       with(urdf_, "<link name=\"base_link\"", "<xacro:tool parent=\"x\"/>\n  <link name=\"base_link\"");
-  write_file(path("ur5_arm.urdf"), macro);
+  write_file(path("ur10e_arm.urdf"), macro);
   const std::string said = refusal(rig_);
-  EXPECT_NE(said.find("ur5_arm.urdf"), std::string::npos) << said;
+  EXPECT_NE(said.find("ur10e_arm.urdf"), std::string::npos) << said;
   EXPECT_NE(said.find("element xacro:tool"), std::string::npos) << said;
   EXPECT_NE(said.find("rosrun xacro xacro"), std::string::npos) << said;
   // What xacro has written names it in a comment.
-  write_file(path("ur5_arm.urdf"),
+  write_file(path("ur10e_arm.urdf"),
              with(urdf_, "<link name=\"base_link\"", "<!-- by <xacro:tool/> --><link name=\"base_link\""));
   EXPECT_EQ(refusal(rig_), "accepted");
 }
 
 TEST_F(ArmRigFile, AUrdfByItselfIsAllItsJointsThatMove) {
-  const std::string urdf = path("ur5_arm.urdf");
-  const ArmRig declared = load_arm_rig(path("ur5_arm.yaml"));
+  const std::string urdf = path("ur10e_arm.urdf");
+  const ArmRig declared = load_arm_rig(path("ur10e_arm.yaml"));
   const ArmRig rig = arm_rig_of_urdf(urdf);
   EXPECT_EQ(rig.joint_names(), declared.joint_names());  // tool0_joint is fixed
   write_file(path("of_urdf.yaml"), rig.text);

@@ -93,8 +93,8 @@ TEST(Trace, FindsAPayloadWithItsLinkAndMass) {
     const signal::Measured& m = step.parameters[i].measured;
     EXPECT_LT(std::fabs(m.value - truth[i]), 4 * m.standard_error)
         << step.parameters[i].name << " " << m.value;
-    // Blocks of time leave 0.02 m; friction that lags by a tenth of Coulomb's makes it 0.023 m.
-    EXPECT_LT(m.standard_error, i == 0 ? 0.3 : 0.03);
+    // Blocks of time leave 0.02 m; friction that lags by a tenth of Coulomb's makes it 0.033 m.
+    EXPECT_LT(m.standard_error, i == 0 ? 0.3 : 0.04);
   }
   EXPECT_FALSE(trace.unexplained);
   for (std::size_t j = 0; j < 6; ++j) EXPECT_LT(trace.after[j], 0.05);

@@ -59,7 +59,7 @@ JOINTS = ["none"] * 4 + ["gravity,load_dependent_friction"] * 6 + [
     "gravity,stribeck,load_dependent_friction", "gravity,cogging,friction_drift",
     "outside_torque", "gravity,outside_torque", "wandering_torque", "gravity,wandering_torque", "friction_swing",
     "gravity,friction_swing", "payload_step", "gravity,payload_step"]
-RIGS = {"servo": "config/two_inertia_servo.yaml", "joint": "config/ur5_joint.yaml"}
+RIGS = {"servo": "config/two_inertia_servo.yaml", "joint": "config/ur10e_joint.yaml"}
 GROUPS = ("clean", "noisy", "joint")
 
 Case = collections.namedtuple("Case", "name effects options group")

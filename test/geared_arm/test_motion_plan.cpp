@@ -85,8 +85,8 @@ TEST_P(MotionPlans, HoldTheLimitsBetweenTheTimesOfTheSearchToo) {
 
 INSTANTIATE_TEST_SUITE_P(Arms, MotionPlans,
                          testing::Values(std::pair{"two_link_arm/two_link_arm", 5},
-                                         std::pair{"ur5_arm/ur5_arm_geared", 2},
-                                         std::pair{"ur5_arm/ur5_arm_geared", 20}),
+                                         std::pair{"ur10e_arm/ur10e_arm_geared", 2},
+                                         std::pair{"ur10e_arm/ur10e_arm_geared", 20}),
                          [](const auto& info) {
                            return std::string(info.param.first).substr(0, 3) +
                                   std::to_string(info.param.second);
@@ -148,7 +148,7 @@ Eigen::MatrixXd defined_regressor(const GearedArm& arm, const arm::Joints& q, co
 }
 
 TEST(MotionPlan, InformationIsThatOfTheSingularValues) {
-  for (const std::string name : {"two_link_arm/two_link_arm", "ur5_arm/ur5_arm_geared"}) {
+  for (const std::string name : {"two_link_arm/two_link_arm", "ur10e_arm/ur10e_arm_geared"}) {
     const GearedArm arm = arm_of(name);
     const std::vector<MotionLimits> limits = load_motion_limits(arm, std::nullopt);
     const auto n = Eigen::Index(limits.size());
@@ -400,7 +400,7 @@ TEST(MotionPlan, TellsThePlaysThatTheMotionOfTheFileHides) {
 /// Of six joints the one that gravity does not load is told as such, and its reason; the lift, which the
 /// motion of the file does not tell, is shown.
 TEST(MotionPlan, OfSixJointsItTellsWhichWillBeTold) {
-  const GearedArm declared = arm_of("ur5_arm/ur5_arm_geared");
+  const GearedArm declared = arm_of("ur10e_arm/ur10e_arm_geared");
   PlanSettings settings = quick();
   settings.steps = 1500;
   const MotionPlan plan = planned(declared, settings);

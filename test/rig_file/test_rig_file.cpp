@@ -195,11 +195,11 @@ TEST(RigFile, AnAngularMeshHasNoBaseRadius) {
 
 TEST(RigFile, AnArmsIsKnownByItsUrdf) {
   const std::string folder = test::package_file("config/");
-  EXPECT_TRUE(is_arm_rig(folder + "ur5_arm/ur5_arm.yaml"));
-  EXPECT_FALSE(is_arm_rig(folder + "ur5_joint.yaml"));
-  EXPECT_TRUE(is_urdf(folder + "ur5_arm/ur5_arm.urdf"));
-  EXPECT_FALSE(is_urdf(folder + "ur5_arm/ur5_arm.yaml"));
-  EXPECT_THROW(is_arm_rig(folder + "ur5_arm/ur5_arm.urdf"), BadData);
+  EXPECT_TRUE(is_arm_rig(folder + "ur10e_arm/ur10e_arm.yaml"));
+  EXPECT_FALSE(is_arm_rig(folder + "ur10e_joint.yaml"));
+  EXPECT_TRUE(is_urdf(folder + "ur10e_arm/ur10e_arm.urdf"));
+  EXPECT_FALSE(is_urdf(folder + "ur10e_arm/ur10e_arm.yaml"));
+  EXPECT_THROW(is_arm_rig(folder + "ur10e_arm/ur10e_arm.urdf"), BadData);
 }
 
 // By hand: the spring softer by 12 %, and a contact of a 2.5th of the stiffness, 2.5^(2/3) = 1.842.

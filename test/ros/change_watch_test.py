@@ -155,7 +155,7 @@ class ChangeWatchTest(unittest.TestCase):
             self.assertIn(reason, answer.message)
 
     def test_7_wrong_parameters_end_the_node_with_their_name(self):
-        rig = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), "config", "ur5_joint.yaml")
+        rig = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), "config", "ur10e_joint.yaml")
         for words, code, shown in (([], 64, ("~rig", "must be given")),
                                    (["_rig:=" + rig, "_windw:=100"], 64, ("~windw",)),
                                    (["_rig:=" + rig, "_window:=5"], 64, ("~window", "5")),

@@ -86,7 +86,7 @@ struct Robot {
 WatchSettings settings(const ScratchFolder& folder) {
   WatchSettings s;
   s.joint.joint = "joint";
-  s.joint.rig = rig_file::load_rig_file(BACKLASH_DIAGNOSIS_SOURCE_DIR "/config/ur5_joint.yaml");
+  s.joint.rig = rig_file::load_rig_file(BACKLASH_DIAGNOSIS_SOURCE_DIR "/config/ur10e_joint.yaml");
   s.learned = folder.path("joint_healthy.csv");
   s.log = folder.path("joint_changes.csv");
   s.learn = 120;

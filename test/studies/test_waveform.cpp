@@ -313,7 +313,7 @@ TEST(Waveform, AnotherContactIsOutOfDomain) {
 TEST(Waveform, OnlyRigsThatItsEquationsDescribe) {
   EXPECT_TRUE(rig_file::default_rig_file().diagnosis.waveform);
   for (const char* rig :
-       {"config/two_inertia_servo.yaml", "config/yumrukcal_2013.yaml", "config/ur5_joint.yaml"})
+       {"config/two_inertia_servo.yaml", "config/yumrukcal_2013.yaml", "config/ur10e_joint.yaml"})
     EXPECT_FALSE(rig_file::load_rig_file(test::package_file(rig)).diagnosis.waveform) << rig;
 }
 

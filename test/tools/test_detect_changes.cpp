@@ -38,7 +38,7 @@ TEST_F(DetectChanges, TellsEachChangeOfTheSharedRecordsAndNothingElse) {
   const std::map<std::string, std::string> names = {{"friction_up", "motor_coulomb"}, {"payload", "gravity"}};
   for (const auto& [name, truth] : records.items()) {
     const std::string record = *find_data("changes/" + name + ".csv");
-    const Outcome outcome = run("detect_changes --rig " + package_file("config/ur5_joint.yaml") +
+    const Outcome outcome = run("detect_changes --rig " + package_file("config/ur10e_joint.yaml") +
                                 " --healthy " + *find_data("changes/healthy_a.csv") + " " +
                                 *find_data("changes/healthy_b.csv") + " --json out.json " + record);
     ASSERT_EQ(outcome.code, truth["since"].is_null() ? 0 : 2) << outcome.err;
@@ -118,7 +118,7 @@ TEST_F(DetectChanges, TellsWhichJointOfAnArmHasMorePlayAndWhatItCarries) {
 TEST_F(DetectChanges, TellsAPushOnAMeasuredArmThatHoldsItsPose) {
   const auto push = find_data("measured/ur5_arm_push.csv"), healthy = find_data("measured/ur5_arm_b.csv");
   if (!push || !healthy) GTEST_SKIP() << "measured/ur5_arm_push.csv is not there";
-  const Outcome outcome = run("detect_changes --rig " + package_file("config/ur5_arm/ur5_arm.yaml") +
+  const Outcome outcome = run("detect_changes --rig " + package_file("config/ur10e_arm/ur10e_arm.yaml") +
                               " --healthy " + *healthy + " --json out.json " + *push);
   ASSERT_EQ(outcome.code, 2) << outcome.err;
   const Json first = Json::parse(read("out.json"))["changes"][0];
@@ -132,7 +132,7 @@ TEST_F(DetectChanges, TellsAPushOnAMeasuredArmThatHoldsItsPose) {
 
 // Learned from one short record, in another task: what the model of a real arm lacks is no change.
 TEST_F(DetectChanges, HealthyTasksOfAMeasuredArmAreNoChangesOfEachOther) {
-  const std::string rig = package_file("config/ur5_arm/ur5_arm.yaml");
+  const std::string rig = package_file("config/ur10e_arm/ur10e_arm.yaml");
   for (const auto& [learned, looked_at] :
        {std::pair("a", "b"), std::pair("b", "a"), std::pair("a", "free"), std::pair("free", "b")}) {
     const auto healthy = find_data("measured/ur5_arm_" + std::string(learned) + ".csv");

@@ -46,6 +46,10 @@ TEST_F(ExportModel, ExitCodes) {
   EXPECT_EQ(run("export_model two_inertia_servo.yaml --out servo.xml --torque 0").code, 64);
   EXPECT_EQ(run("export_model none.yaml --out servo.xml").code, 66);
   EXPECT_EQ(run("export_model two_inertia_servo.yaml --out none/servo.xml").code, 73);
+  EXPECT_EQ(run("export_model --out servo.xml").code, 64);
+  EXPECT_EQ(run("export_model --urdf robot.urdf --out new.urdf").code, 64);
+  EXPECT_EQ(run("export_model --urdf robot.urdf --rig two_inertia_servo.yaml --out new.xml").code, 64);
+  EXPECT_EQ(run("export_model --urdf robot.urdf --rig two_inertia_servo.yaml --out new.urdf").code, 65);
   const Outcome outcome = run("export_model sarkar_1997.yaml --out servo.xml");
   EXPECT_EQ(outcome.code, 65);
   expect_contains(outcome.err, "sarkar_1997.yaml: gear_train.link is locked");

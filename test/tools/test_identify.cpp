@@ -114,7 +114,7 @@ class OneJoint : public Identify {
   Outcome identified(const std::string& csv) {
     write("swing.csv", csv);
     if (!exists("joint.yaml"))
-      std::filesystem::create_symlink(package_file("config/ur5_joint.yaml"), path("joint.yaml"));
+      std::filesystem::create_symlink(package_file("config/ur10e_joint.yaml"), path("joint.yaml"));
     return run("identify swing.csv --rig joint.yaml --out fit.yaml --json fit.json");
   }
 };

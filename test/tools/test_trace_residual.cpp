@@ -156,13 +156,13 @@ std::string at_one_speed(unsigned seed) {
 // is drawn some motion seems to stand out of it, and the torque is noise, or none does, and nothing is
 // fitted.
 TEST_F(TraceResidual, RecordsAtOneSpeedEndInAReportThatSaysWhyItCannotTell) {
-  write("ur5_joint.yaml", content(package_file("config/ur5_joint.yaml")));
+  write("ur10e_joint.yaml", content(package_file("config/ur10e_joint.yaml")));
   int not_fitted = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     write("train.csv", at_one_speed(seed));
     write("test.csv", at_one_speed(100 + seed));
     const Outcome outcome =
-        run("trace_residual --rig ur5_joint.yaml --train train.csv --test test.csv --out out");
+        run("trace_residual --rig ur10e_joint.yaml --train train.csv --test test.csv --out out");
     EXPECT_EQ(outcome.code, 3) << outcome.err;
     expect_contains(outcome.out, "Cannot tell what is missing: ");
     const Json result = report();

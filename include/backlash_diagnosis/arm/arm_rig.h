@@ -59,6 +59,16 @@ struct Payload {
   BodyParameters parameters;  // of the body itself, in the frame of the joint that turns the link
 };
 
+/// What the motions that a rig was fitted to show of a standard parameter of a link (mass, moments,
+/// inertias): it leads a base parameter; it is a part of some, and known in a sum with others only; or they
+/// do not show it at all. But for the first its interval is infinite.
+enum class Shown { leads, in_others, not_at_all };
+
+/// LINK/mass, ... of a standard parameter, counted over all links.
+std::string standard_name(const Chain& chain, std::size_t index);
+/// mass, moment_x, ..., inertia_zz: the ten of BodyParameters, and their units.
+extern const std::array<const char*, 10> kStandardNames, kStandardUnits;
+
 struct ArmRig {
   std::string name;
   std::string urdf;  // path
@@ -67,9 +77,10 @@ struct ArmRig {
   std::vector<JointDrive> joints;
   double common_error = 0;  // of all constants together, relative; known of a fitted rig
   ArmIdentification identification;
-  HeldJoints held;      // of the URDF, that stand still
-  Chain chain;          // of the URDF, with the fitted links in its place where there are some
-  bool fitted = false;  // the file has links of its own
+  HeldJoints held;           // of the URDF, that stand still
+  Chain chain;               // of the URDF, with the fitted links in its place where there are some
+  bool fitted = false;       // the file has links of its own
+  std::vector<Shown> shown;  // ten of each link; empty: not said
   std::vector<Payload> payloads;
   std::string source;  // path of the rig file
   std::string text;

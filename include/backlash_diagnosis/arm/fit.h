@@ -9,7 +9,9 @@
 // whatever mass fits best, so that only its shape counts: at a weight of one as known to a factor of e or so,
 // which matters only where the records say nothing (Lee, Wensing and Park 2020, IEEE T-RO 36:168). What must
 // be positive in a drive has the same divergence in one dimension. All masses together are only as well known
-// as the declared constants. Standard errors are those of blocks left out, plus what the declared values
+// as the declared constants, kappa ~ N(0, e^2 + c^2 1 1^T) with each constant's own error e and the one that
+// all share, c; a body of known mass in some of the records makes them as well known as its torque is
+// measured. Standard errors are those of blocks left out, plus what the declared values
 // leave open; of a payload also what friction that lags behind its model, by a tenth of Coulomb's (rms),
 // could pass for: it follows the acceleration as inertia does, and no block of time knows better.
 #pragma once
@@ -52,6 +54,10 @@ struct FitFreedom {
   bool links = true, drives = true, constants = true;
   std::optional<std::size_t> payload;  // at this link, in the motions that are marked
   double payload_sign = 1;
+  /// Mass of the body [kg] in states 1, 2, ...: one body per state. NaN as error: not known. Empty: one body
+  /// of unknown mass.
+  std::vector<signal::Measured> weights;
+  std::size_t states() const { return weights.empty() ? 1 : weights.size(); }
   bool tilt = false;                // of gravity, in the motions that are marked
   bool load = false;                // friction that follows the load, about what is known of it
   bool friction = false;            // of each joint, in the motions that are marked: a factor
@@ -64,9 +70,12 @@ struct FitFreedom {
   bool rubs_otherwise(std::size_t joint) const;
 };
 
+/// A machine of several states shares all values but those that its states have of their own: body, factor of
+/// friction, offset.
 struct FittedMotion {
   const ArmMotion* motion = nullptr;
-  bool marked = false;
+  std::size_t state = 0;  // 0: that of the links and drives; others are `marked`
+  bool marked() const { return state > 0; }
 };
 
 /// A base parameter: what of the standard ones the motions tell apart.
@@ -89,19 +98,27 @@ struct Contradiction {
   double alone = 0, together = 0;
 };
 
+/// What a marked state has of its own.
+struct FittedState {
+  BodyParameters payload = BodyParameters::Zero();  // times the sign
+  signal::Measured mass, centre[3];  // of the payload; of a fitted rig without the common error of constants
+  Eigen::Matrix3d moment_covariance = Eigen::Matrix3d::Zero();  // (kg m)^2, of the payload's m c
+  std::vector<double> shifts;                      // N m, of the joints' offsets, with the factors
+  std::vector<signal::Measured> friction_factors;  // of the joints
+};
+
 struct ArmFit {
   ArmRig rig;  // with fitted values; payload and tilt are not in its chain, free effects not in its joints
-  BodyParameters payload = BodyParameters::Zero();  // times the sign
-  signal::Measured mass, centre[3];  // of the payload, without the common error of the constants
-  signal::Measured tilt[2];          // rad, about x and y of the base
-  std::vector<double> shifts;        // N m, of the joints' offsets, with the factors
-  std::vector<signal::Measured> friction_factors;     // of the joints
-  std::vector<FittedEffect> effects;                  // those that were free
-  std::vector<std::vector<signal::Measured>> drives;  // per joint: kDriveTerms, constant, delay
+  std::vector<FittedState> states = std::vector<FittedState>(1);  // 1, 2, ...
+  const FittedState& marked() const { return states.front(); }    // where there is but one
+  signal::Measured tilt[2];                                       // rad, about x and y of the base
+  std::vector<FittedEffect> effects;                              // those that were free
+  std::vector<std::vector<signal::Measured>> drives;              // per joint: kDriveTerms, constant, delay
   std::vector<BaseParameter> base;
   std::vector<double> deviation;     // sigma_j, unit of the channel; NaN for a joint that does not move
   std::vector<double> train, floor;  // per joint: norm(r) / norm(s - mean(s)); what white noise would leave
   Eigen::MatrixXd covariance;        // of all unknowns, in the order of the fit; empty: nothing was fitted
+  bool weighed = false;              // fit_records(): a known weight has measured the constants
   std::vector<Contradiction> contradictions;  // fit_records() alone looks for them
   std::vector<std::string> warnings;
 };

@@ -35,7 +35,7 @@ struct PushEvent {
   bool released = true;       // else the record ends in it
   double torque = 0;  // N m, the farthest from the level before; the drive's, so the push has the other sign
   double torque_error =
-      0;  // N m: noise, and friction at rest, which the torque of a drive at rest cannot tell from it
+      0;  // N m: noise, the torque constant, and friction at rest, which no torque of a drive at rest shows
   double left = 0;  // N m, the level after less that before: what creep and friction keep
 };
 

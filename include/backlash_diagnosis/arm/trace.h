@@ -21,7 +21,7 @@ namespace backlash::arm {
 struct ArmTraceSettings {
   FitSettings fit;
   double least_gain = 0.3;  // share of the squared error that an effect must take away; choice: friction that
-                            // differs from day to day takes less, see doc/measured/ur5_arm.md
+                            // differs from day to day takes less, see doc/measured/ur10e_arm.md
   double sure = 4;          // standard errors of an effect's size; choice
   double least_tilt = 0.0087;    // rad, half a degree; choice: what a base is levelled to
   double least_friction = 0.25;  // of a factor from one, to be told: less is a robot that warms up; choice
@@ -38,7 +38,7 @@ struct ArmTraceSettings {
   int most_tried = 3;    // guesses for each; choice (time)
   double least_at_joint = 0.5;  // share of its joint's squared error that such an effect must take away, and
   double least_of_signal = 0.025;  // rms of what it explains, of the signal's deviation; choice: bristles of
-                                   // a UR5's joints take up to 0.4 and 0.03, see doc/measured/ur5_arm.md
+                                   // a UR10e's joints take up to 0.4 and 0.03, see doc/measured/ur10e_arm.md
   double law = 0.03;  // of the size of an effect of a joint: its law is not the machine's; choice, tried on
                       // drawn arms, see doc/arm.md
   double of_left = 0.5;  // of what its joint is left with beyond what is expected, that may have its shape;

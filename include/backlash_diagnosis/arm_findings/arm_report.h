@@ -6,17 +6,21 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/arm/fit.h"
+#include "backlash_diagnosis/arm/fit_records.h"
 #include "backlash_diagnosis/arm/trace.h"
 #include "backlash_diagnosis/findings/trace_report.h"
 
 namespace backlash::arm_findings {
 
+using Carried = std::vector<std::optional<arm::Carried>>;  // of each record; empty: none carries anything
+
 /// The `identify` JSON of the design. Parameters: JOINT/term, JOINT/torque_constant, JOINT/delay,
-/// LINK/parameter of the base parameters. Channels: JOINT/torque.
+/// LINK/parameter of the base parameters. Channels: JOINT/torque. What was carried is in `payloads`, what the
+/// motions do not show of the links in `not_identifiable`, where the scale comes from in `common_scale`.
 std::string arm_identification_json(const arm::ArmFit& fit, const std::string& rig,
-                                    const std::vector<std::string>& records);
-void print_arm_summary(const arm::ArmFit& fit, std::ostream& out);
+                                    const std::vector<std::string>& records, const Carried& carried = {});
+void print_arm_summary(const arm::ArmFit& fit, const std::vector<std::string>& records,
+                       const Carried& carried, std::ostream& out);
 
 /// The fitted rig as a file.
 std::string fitted_arm_text(const arm::ArmFit& fit, const std::vector<std::string>& records);

@@ -69,7 +69,7 @@ struct ChangeSettings {
   double over_healthy = 2;  // of the largest gain that growth of friction has in a healthy record. Choice
   double least_steadily = 0.5;  // - of a change that shows where friction may not wander. Choice
   double learned_from_one = 2;  // of the threshold, of a joint of an arm of which one record is healthy: how
-                                // far another task is from it is not known. Measured: a UR5 needs 1.6
+                                // far another task is from it is not known. Measured: a UR10e needs 1.6
   double least_of_two = 0.003;  // - of the rms target of two inertias, that it explains at least: teeth that
                                 // ring and cross the gap leave as much. Choice
   double errors_of_side = 4;    // standard errors of the share of friction that loads the teeth. Choice

@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/for_arm.h"
 
 namespace backlash::tools {
@@ -12,7 +13,11 @@ extern "C" int backlash_run_for_arm(const Arguments& arguments, RecordDoor& door
       {"simulate", [](const Arguments& a, RecordDoor&) { return simulate_arm(a); }},
       {"check_record", [](const Arguments& a, RecordDoor&) { return check_arm(a); }},
       {"diagnose_record", diagnose_arm},
-      {"identify", identify_arm},
+      {"identify",
+       [](const Arguments& a, RecordDoor& door) {
+         return rig_file::is_arm_rig(a.text("rig")) ? identify_arm(a, door) : weigh_joint(a, door);
+       }},
+      {"export_model", [](const Arguments& a, RecordDoor&) { return export_arm(a); }},
       {"trace_residual", trace_arm_residual},
   };
   return commands.at(door.command())(arguments, door);

@@ -14,6 +14,10 @@ int check_arm(const Arguments& arguments);
 int diagnose_arm(const Arguments& arguments, RecordDoor& door);
 /// Outputs are checked already. Throws CannotIdentify.
 int identify_arm(const Arguments& arguments, RecordDoor& door);
+/// The torque constant of a single joint by known weights; the same.
+int weigh_joint(const Arguments& arguments, RecordDoor& door);
+/// What was identified, in the robot's own URDF. Outputs are checked already.
+int export_arm(const Arguments& arguments);
 /// Outputs are checked already.
 int trace_arm_residual(const Arguments& arguments, RecordDoor& door);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <iostream>
+#include <limits>
 
 #include "backlash_diagnosis/arm/fit_records.h"
 #include "backlash_diagnosis/arm_findings/arm_report.h"
@@ -8,10 +9,30 @@
 #include "tools/common/exit_codes.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
+#include "tools/common/weights.h"
 
 namespace backlash::tools {
 
+namespace {
+
+std::vector<std::optional<arm::Carried>> carried_by(const Arguments& arguments) {
+  std::vector<std::optional<arm::Carried>> all;
+  for (const std::optional<Weight>& weight : weights_of(arguments)) {
+    all.emplace_back();
+    if (!weight) continue;
+    if (weight->lever)
+      throw UsageError(
+          "--payload: a lever is that of a single joint; of an arm the records show where a body is");
+    all.back() =
+        arm::Carried{weight->mass.value_or(signal::Measured{0, std::numeric_limits<double>::quiet_NaN()})};
+  }
+  return all;
+}
+
+}  // namespace
+
 int identify_arm(const Arguments& arguments, RecordDoor& door) {
+  const std::vector<std::optional<arm::Carried>> carried = carried_by(arguments);
   const arm::ArmRig rig = arm::load_arm_rig(arguments.text("rig"));
   std::vector<arm::RecordMotions> records;
   std::vector<std::string> warnings;
@@ -21,12 +42,12 @@ int identify_arm(const Arguments& arguments, RecordDoor& door) {
     records.push_back(arm::motions_of(record, rig, warnings));
   }
   ProgressBar bar;
-  arm::ArmFit fit = arm::fit_records(rig, records, {}, bar.progress());
+  arm::ArmFit fit = arm::fit_records(rig, records, {}, bar.progress(), carried);
   fit.warnings.insert(fit.warnings.end(), warnings.begin(), warnings.end());
   write_text(arguments.text("out"), arm_findings::fitted_arm_text(fit, arguments.positionals()));
   write_text(arguments.text("json"), door.with_findings(arm_findings::arm_identification_json(
-                                         fit, arguments.text("rig"), arguments.positionals())));
-  arm_findings::print_arm_summary(fit, std::cout);
+                                         fit, arguments.text("rig"), arguments.positionals(), carried)));
+  arm_findings::print_arm_summary(fit, arguments.positionals(), carried, std::cout);
   return fit.contradictions.empty() ? kHealthy : kInconclusive;
 }
 

@@ -46,6 +46,8 @@ po::options_description described(const Command& command) {
     else if (has_dots(option.value))
       all.add_options()(option.name.c_str(), po::value<std::vector<std::string>>()->multitoken()->composing(),
                         "");
+    else if (option.repeated)
+      all.add_options()(option.name.c_str(), po::value<std::vector<std::string>>()->composing(), "");
     else
       all.add_options()(option.name.c_str(), po::value<std::string>(), "");
   }
@@ -87,7 +89,7 @@ bool takes_more(const Command& command) {
 std::vector<std::string> values_of(const Option& option, const po::variable_value& given) {
   if (option.value.empty()) return {""};
   std::vector<std::string> values;
-  if (has_dots(option.value))
+  if (has_dots(option.value) || option.repeated)
     values = given.as<std::vector<std::string>>();
   else
     values = {given.as<std::string>()};
@@ -178,7 +180,7 @@ Arguments parse_arguments(const Command& command, const std::vector<std::string>
   }
   std::vector<std::string> positional;
   if (given.count(kPositional)) positional = given[kPositional].as<std::vector<std::string>>();
-  if (positional.size() < command.positional.size())
+  if (positional.size() < command.positional.size() && command.positional[positional.size()].front() != '[')
     throw UsageError("missing " + command.positional[positional.size()]);
   if (positional.size() > command.positional.size() && !takes_more(command))
     throw UsageError("unexpected argument '" + printable(positional[command.positional.size()]) + "'");

@@ -19,16 +19,18 @@ class UsageError : public std::runtime_error {
 };
 
 /// "--name VALUE", with a help text that states unit and default; "--name" alone where `value` is empty,
-/// "--name A B C" where it ends in dots ("RECORD...").
+/// "--name A B C" where it ends in dots ("RECORD..."). One that is `repeated` may be there several times,
+/// with one value each.
 struct Option {
   std::string name, value, help;
-  bool required = false;
+  bool required = false, repeated = false;
 };
 
 struct Command {
   std::string name;
-  std::string summary;                  ///< one sentence
-  std::vector<std::string> positional;  ///< "RIG.yaml", all required; "RECORD..." as the last: one or more
+  std::string summary;  ///< one sentence
+  /// "RIG.yaml", required; "[RIG.yaml]" may be absent; "RECORD..." as the last: one or more
+  std::vector<std::string> positional;
   std::vector<Option> options;
   std::string notes;                  ///< paragraphs after the options
   std::vector<std::string> examples;  ///< without "rosrun backlash_diagnosis"
@@ -48,7 +50,8 @@ class Arguments {
   const std::vector<std::string>& positionals() const { return positional_; }
   bool has(const std::string& option) const { return options_.count(option) > 0; }
   std::string text(const std::string& option) const;  ///< empty where absent, never where a value is given
-  const std::vector<std::string>& texts(const std::string& option) const;  ///< of a required option
+  /// Of one that is required or there.
+  const std::vector<std::string>& texts(const std::string& option) const;
   double number(const std::string& option, double absent, const Range& range) const;
   std::uint64_t integer(const std::string& option, std::uint64_t absent, std::uint64_t lower,
                         std::uint64_t upper) const;
