@@ -215,7 +215,10 @@ double MappedRows::read_field(const MappedColumn& column, const std::string& fie
   if (field.empty()) fail("empty");
   const std::string text = mark_.with_point(field, column.name, place);
   const ParsedNumber number = is_time(column) ? clock_->read(text) : parse_number(text);
-  if (!number) fail(number.problem);
+  if (!number)
+    fail(field.front() == '(' || field.front() == '['
+             ? "several numbers: `element` of channels." + column.key + " says which, from 1"
+             : number.problem);
   if (is_time(column)) return number.value;
   const ColumnSource& source = *column.source;
   double value = number.value;

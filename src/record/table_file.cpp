@@ -2,7 +2,6 @@
 #include "backlash_diagnosis/record/table_file.h"
 
 #include <filesystem>
-#include <iterator>
 #include <map>
 
 #include "backlash_diagnosis/base/error.h"
@@ -14,6 +13,8 @@
 
 namespace backlash::record {
 namespace {
+
+constexpr std::size_t kMostJson = std::size_t{1} << 28;  // bytes; choice: as a tree it takes ten times that
 
 std::string extension_of(const std::string& path) {
   return std::filesystem::path(path).extension().string();
@@ -75,8 +76,10 @@ Record read_table(const std::string& path, const ChannelMap& map) {
                   "has names of its own: a rig file (--rig) must say in `channels` which of them is what "
                   "(doc/reference/records.md)");
   if (extension_of(path) == ".npz") return read_npz(path, map);
-  std::ifstream in = open_input(path);
-  return read_json({std::istreambuf_iterator<char>(in), {}}, path, map);
+  const std::string text = read_start(path, kMostJson + 1);
+  if (text.size() > kMostJson)
+    throw BadData(path, "has more than " + std::to_string(kMostJson) + " bytes, which are not read as JSON");
+  return read_json(text, path, map);
 }
 
 }  // namespace backlash::record

@@ -124,6 +124,11 @@ TEST(TableFile, TuplesInAFieldAreReadByElement) {
   EXPECT_EQ(r.column(C::motor_velocity), (Values{-2, -3}));
   EXPECT_EQ(refusal([&] { csv(header + "0.5,\"(0.25)\",0\n", map); }),
             "run.csv:2: a1 position [rad] = '(0.25)': has no element 2");
+  const ChannelMap whole = channels("  time: {column: time}\n  motor_position: {column: a1 position}\n");
+  EXPECT_EQ(
+      refusal([&] { csv(header + "0.5,\"(0.25, 1)\",0\n", whole); }),
+      "run.csv:2: a1 position [rad] = '(0.25, 1)': several numbers: `element` of channels.motor_position "
+      "says which, from 1");
 }
 
 TEST(TableFile, AChannelIsComputedFromColumns) {

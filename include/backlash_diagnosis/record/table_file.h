@@ -9,7 +9,6 @@
 //          stored or deflated. A column of a two-dimensional array is read by `element`
 #pragma once
 
-#include <iosfwd>
 #include <string>
 
 #include "backlash_diagnosis/record/channel_map.h"
