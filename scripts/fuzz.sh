@@ -41,6 +41,7 @@ fuzz() {
 
 found=0
 fuzz csv csv || found=1
+fuzz table csv || found=1
 fuzz rig yaml || found=1
 fuzz curve yaml || found=1
 fuzz joint_state names || found=1

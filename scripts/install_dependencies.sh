@@ -14,6 +14,7 @@ build=(
   libdynamic-reconfigure-config-init-mutex-dev python3-dynamic-reconfigure
   libboost-dev libboost-program-options-dev libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev
   liblz4-dev libsqlite3-dev libzstd-dev                           # recordings of ROS 2
+  libminizip-dev                                                  # archives of NumPy; no rosdep key either
   libceres-dev libsundials-dev                                    # SUNDIALS has no rosdep key, hence not in package.xml
   liburdfdom-dev liburdfdom-headers-dev libexpat1-dev             # robots as URDF, and what is written into one
 )

@@ -12,6 +12,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/record/channels.h"
 #include "joint_effects.h"
 
 namespace backlash::arm {
@@ -66,7 +67,24 @@ std::vector<std::string> term_names() {
   return names;
 }
 
-JointDrive read_joint(const YamlReader& yaml) {
+/// Columns of a file; messages of an arm have the robot's own names.
+record::ChannelMap read_joint_channels(const YamlReader& yaml, const std::string& joint,
+                                       const record::ChannelMap& time, record::Channel channel) {
+  const auto channels = yaml.optional_map("channels");
+  if (!channels) return {};
+  record::ChannelMap map = record::read_channels(yaml, joint, false, time);
+  const auto has = [&](record::Channel wanted) {
+    return std::any_of(map.columns.begin(), map.columns.end(),
+                       [&](const record::ColumnSource& c) { return c.channel == wanted; });
+  };
+  for (const record::Channel wanted : {record::Channel::motor_position, channel})
+    if (!has(wanted))
+      yaml.fail("channels", "must say the column of " + record::channel_name(wanted) + " for " + joint);
+  if (map.declared) yaml.fail("channels", "of an arm's joint are columns: `name` is none");
+  return map;
+}
+
+JointDrive read_joint(const YamlReader& yaml, const record::ChannelMap& time, record::Channel channel) {
   JointDrive joint;
   joint.name = yaml.text("name");
   joint.constant = yaml.number_or("torque_constant", 1, Range::positive());
@@ -87,6 +105,7 @@ JointDrive read_joint(const YamlReader& yaml) {
   for (const char* key :
        {"gear", "limits", "link_coulomb", "link_viscous", "held", "excitation", "motion_limits"})
     yaml.ignore(key);
+  joint.channels = read_joint_channels(yaml, joint.name, time, channel);
   joint.training_error = yaml.number_or("training_error", 0, Range::not_negative());
   return joint;
 }
@@ -157,7 +176,8 @@ std::string path_in(const std::string& folder, const std::string& path) {
 
 void read_drives(const YamlReader& yaml, ArmRig& rig) {
   const YamlReader drive = yaml.map("drives");
-  rig.channel = record::channel_from_name(drive.choice("channel", {"motor_current", "motor_torque"}));
+  rig.channel =
+      record::channel_from_name(drive.choice("channel", {"motor_current", "motor_torque", "output_torque"}));
   for (const std::string& name : drive.texts("terms")) {
     const std::vector<std::string> known = term_names();
     if (std::find(known.begin(), known.end(), name) == known.end())
@@ -167,12 +187,16 @@ void read_drives(const YamlReader& yaml, ArmRig& rig) {
   rig.common_error = 0;
   if (drive.has("common_uncertainty"))
     rig.common_error = drive.number("common_uncertainty", Range::between(0, 1));
+  record::ChannelMap time;
+  if (const auto channels = yaml.optional_map("channels")) record::read_time(*channels, time);
   for (const YamlReader& joint : yaml.maps("joints")) {
-    rig.joints.push_back(read_joint(joint));
+    rig.joints.push_back(read_joint(joint, time, rig.channel));
     for (std::size_t i = 0; i + 1 < rig.joints.size(); ++i)
       if (rig.joints[i].name == rig.joints.back().name) joint.fail("name", "there twice");
-    if (rig.channel == record::Channel::motor_torque && rig.joints.back().constant != 1)
+    if (rig.channel != record::Channel::motor_current && rig.joints.back().constant != 1)
       joint.fail("torque_constant", "a torque is recorded: must be 1 or absent");
+    if (rig.joints.back().channels.columns.empty() != rig.joints.front().channels.columns.empty())
+      joint.fail("channels", "all joints must have columns, or none");
   }
   if (rig.joints.empty()) yaml.fail("joints", "must name at least one");
   for (const JointDrive& joint : rig.joints)
@@ -292,6 +316,8 @@ std::string joint_text(const ArmRig& rig, const JointDrive& joint) {
   }
   if (joint.friction_speed > 0)
     text += fmt::format("    friction_speed: {:.8g}  # rad/s\n", joint.friction_speed);
+  if (!joint.channels.columns.empty())
+    text += "    channels:\n" + record::columns_text(joint.channels, "      ");
   if (joint.training_error > 0)
     text += fmt::format("    training_error: {:.4g}  # relative\n", joint.training_error);
   if (!joint.effects.empty()) text += "    effects:\n";
@@ -318,6 +344,8 @@ std::string arm_rig_text(const ArmRig& rig, const std::vector<std::string>& comm
       text += fmt::format("  \"{}\": {}\n", joint, to_text(position));
     text += "\n";
   }
+  if (!rig.joints.empty() && !rig.joints.front().channels.columns.empty())
+    text += "channels:\n  " + record::time_column_text(rig.joints.front().channels) + "\n\n";
   text += fmt::format("drives:\n  channel: {}\n  terms: [{}]\n", record::channel_name(rig.channel), terms);
   if (rig.common_error > 0)
     text += fmt::format("  common_uncertainty: {:.4g}  # relative, of all torque constants together\n",

@@ -17,6 +17,7 @@
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "flank_choice.h"
 #include "refusal.h"
+#include "rest_levels.h"
 
 namespace backlash::diagnosis {
 namespace {
@@ -455,7 +456,15 @@ Answer read(const record::Record& record, const PositionDifferenceSettings& sett
 }
 
 void fill(const record::Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
-  const Answer answer = read(record, settings);
+  Answer answer;
+  try {
+    answer = read(record, settings);
+  } catch (const Refusal&) {
+    if (settings.output_locked) throw;
+    const TwoEncoders motion = without_skew(collect(record, settings), settings.encoder_skew);
+    if (read_at_rest(motion, settings, estimate)) return;
+    throw;
+  }
   const FlankFit& fit = answer.fit;
   double lower = answer.least - answer.half, upper = answer.largest + answer.half;
   if (fit.varies) {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/fitted_rig.h"
 
+#include <cmath>
+
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
+#include "backlash_diagnosis/model/term_text.h"
 #include "backlash_diagnosis/rig_file/known_values.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
@@ -19,6 +22,16 @@ std::map<std::string, Value> values_by_table(const std::map<std::string, Value>&
   return all;
 }
 
+/// The weight that was fitted, in place of the declared one; what no record showed stays.
+void replace_weight(rig_file::RigDocument& document, const Identification& found) {
+  const auto amplitude = found.parameters.find("gravity_amplitude");
+  if (amplitude == found.parameters.end() || std::isinf(amplitude->second.standard_error)) return;
+  for (const auto& term : found.rig.terms)
+    if (term->id == "gravity")
+      document.replace_terms([](const std::string& id) { return id == "gravity"; },
+                             {model::term_text(*term)});
+}
+
 }  // namespace
 
 std::string fitted_rig_text(const rig_file::RigFile& declared, const Identification& found) {
@@ -27,10 +40,12 @@ std::string fitted_rig_text(const rig_file::RigFile& declared, const Identificat
                                        "identified from " + joined(found.procedures.front().records));
   rig_file::RigDocument document(declared);
   const double ratio = declared.rig.motor_axis_ratio();
-  if (declared.rig.mesh.rigid)
+  if (declared.rig.mesh.rigid) {
     document.set_fitted({found.rig, ratio, values_by_table(found.parameters), values_by_table(found.units)});
-  else
+    replace_weight(document, found);
+  } else {
     document.set_fitted({found.rig, ratio, found.parameters, found.units});
+  }
   if (found.gap_map && gap_varies(declared.rig) && !found.unexplained)
     replace_gap_terms(document, *found.gap_map, found.rig.mesh.backlash / found.rig.mesh.lever());
   document.read();  // what is written can be read

@@ -8,6 +8,12 @@
 #include "backlash_diagnosis/record/unit.h"
 
 namespace backlash::record {
+namespace {
+
+constexpr int kMostBits =
+    32;  // theory: whole numbers that a double holds; counters and drives have 8, 16 or 32
+
+}  // namespace
 
 const char* field_name(Field field) {
   static const char* const kNames[] = {"position", "velocity", "effort"};
@@ -116,23 +122,52 @@ void check_own_name(const ColumnSource& s, const std::string& source, const std:
               " in SI units: rename it in the header, or give it its unit there (" + name + " [...])");
 }
 
+void check_computed(const ColumnSource& s, const std::string& source);
+
 void check_column(const ColumnSource& s, const std::string& source, const std::string& own) {
-  require(!s.column.empty(), source, "column", "''", "must not be empty");
   check_conversion(source, s.scale.value_or(1), s.offset);
   const Unit* const unit = s.unit.empty() ? nullptr : find_unit(s.unit);
   require(s.unit.empty() || unit != nullptr, source, "unit", s.unit, "unknown, known are " + known_units());
+  if (s.is_computed()) return check_computed(s, source);
+  require(!s.column.empty(), source, "column", "''", "must not be empty");
+  require(s.bits == 0 || (s.bits > 1 && s.bits <= kMostBits), source, "bits", std::to_string(s.bits),
+          "must be 2 to " + std::to_string(kMostBits));
   check_own_name(s, source, own, unit);
 }
 
-void check_columns(const ChannelMap& map) {
-  require(!map.time.column.empty(), kTimeColumn, "column", "''", "must name the column with the time");
+void check_computed(const ColumnSource& s, const std::string& source) {
+  require(s.column.empty() && (s.sum.empty() || s.product.empty()), source, "column", s.column,
+          "must be the only one of column, sum and product");
+  require(!s.unit.empty(), source, "unit", "''", "must be said of a sum or product");
+  for (const std::vector<ColumnSource>* parts : {&s.sum, &s.product})
+    for (const ColumnSource& part : *parts) {
+      require(!is_own_column(part.column), source, "column", part.column,
+              "is a name of the package's own format, of which nothing is computed");
+      check_column(part, source, "");
+    }
+}
+
+void check_time(const ChannelMap& map) {
+  if (map.rate != 0) {
+    require(std::isfinite(map.rate) && map.rate > 0, kTimeColumn, "rate", std::to_string(map.rate),
+            "must be > 0");
+    require(map.time.column.empty(), kTimeColumn, "column", map.time.column, "is said beside a rate");
+    return;
+  }
+  require(!map.time.column.empty(), kTimeColumn, "column", "''",
+          "must name the column with the time; where there is none say its rate (Hz)");
   check_column(map.time, kTimeColumn, kTimeColumn);
   if (const Unit* const unit = find_unit(map.time.unit))
     require(unit->quantity == Quantity::time, kTimeColumn, "unit", map.time.unit, "is no time");
+}
+
+void check_columns(const ChannelMap& map) {
+  check_time(map);
   for (const ColumnSource& s : map.columns) {
     const std::string& name = channel_name(s.channel);
     check_column(s, name, name);
-    require(s.column != map.time.column, name, "column", s.column, "is the column with the time");
+    require(s.is_computed() || s.column != map.time.column || s.element != map.time.element, name, "column",
+            s.column, "is the column with the time");
     if (const Unit* const unit = find_unit(s.unit)) {
       const std::string reason = misfit(*unit, s.channel, map.linear, s.scale.has_value());
       require(reason.empty(), name, "unit", s.unit, reason);

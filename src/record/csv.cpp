@@ -131,7 +131,8 @@ class Reader {
   [[noreturn]] void fail_unknown_column(const std::string& name) const {
     std::string known = kTimeColumn;
     for (const Channel channel : kChannels) known += ", " + channel_name(channel);
-    lines_.fail("column = " + in_quotes(name) + ": unknown, known are " + known);
+    lines_.fail("column = " + in_quotes(name) + ": unknown, known are " + known +
+                "; a file with names of its own, or none, is read by `channels` of a rig file (--rig)");
   }
 
   // A tab beside a field is a space; one within it separates.

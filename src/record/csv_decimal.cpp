@@ -22,30 +22,28 @@ bool may_be_thousands(std::string_view text, std::size_t comma) {
 
 }  // namespace
 
-std::string DecimalMark::with_point(std::string_view text, const std::string& column,
-                                    const LineReader& lines) {
+std::string DecimalMark::with_point(std::string_view text, const std::string& column, const Place& where) {
   std::string plain(text);
   const auto place = text.find_first_of(comma_allowed_ ? ".," : ".");
   if (place == std::string_view::npos) return plain;
   const char mark = text[place];
   if (mark_ == '\0') {
     mark_ = mark;
-    line_ = lines.number();
+    line_ = where.number();
     first_ = printable(column) + " = " + in_quotes(text);
   }
   if (mark != mark_)
-    lines.fail(printable(column) + " = " + in_quotes(text) + ": a decimal " +
-               (mark == ',' ? "comma, but a point" : "point, but a comma") + " in line " +
-               std::to_string(line_));
+    where.fail(printable(column) + " = " + in_quotes(text) + ": a decimal " +
+               (mark == ',' ? "comma, but a point" : "point, but a comma") + " in " + where.text(line_));
   if (mark != ',') return plain;
   sure_ = sure_ || !may_be_thousands(text, place);
   plain[place] = '.';
   return plain;
 }
 
-void DecimalMark::finish(const LineReader& lines) const {
+void DecimalMark::finish(const Place& where) const {
   if (mark_ != ',' || sure_) return;
-  lines.fail_at(line_,
+  where.fail_at(line_,
                 first_ +
                     ": a decimal comma, or one between thousands? All numbers of the file with a comma "
                     "could be either; write them with a decimal point");

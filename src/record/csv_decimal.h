@@ -16,10 +16,10 @@ class DecimalMark {
   void allow_comma(bool allowed) { comma_allowed_ = allowed; }
 
   /// The text with a decimal point; BadData where the mark is another than before.
-  std::string with_point(std::string_view text, const std::string& column, const LineReader& lines);
+  std::string with_point(std::string_view text, const std::string& column, const Place& where);
 
   /// At the end of the file: BadData where all its commas could part thousands ("1,234").
-  void finish(const LineReader& lines) const;
+  void finish(const Place& where) const;
 
  private:
   bool comma_allowed_ = false;

@@ -11,7 +11,7 @@
 namespace backlash::record {
 
 bool LineReader::next(std::string_view& line) {
-  ++number_;
+  go_to(number() + 1);
   const char* newline = find_newline();
   while (newline == nullptr && refill()) newline = find_newline();
   const std::size_t length =
@@ -26,12 +26,12 @@ bool LineReader::next(std::string_view& line) {
   line = std::string_view(start, static_cast<std::size_t>(end - start));
   if (line.find('\0') != std::string_view::npos) fail("contains a NUL byte: not a text file in UTF-8");
   if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-  if (number_ == 1 && line.substr(0, 3) == "\xef\xbb\xbf") line.remove_prefix(3);
+  if (number() == 1 && line.substr(0, 3) == "\xef\xbb\xbf") line.remove_prefix(3);
   return true;
 }
 
-void LineReader::fail_at(std::size_t line, const std::string& reason) const {
-  throw BadData(name_ + ":" + std::to_string(line), reason);
+void Place::fail_at(std::size_t number, const std::string& reason) const {
+  throw BadData(name_ + before_ + std::to_string(number), reason);
 }
 
 const char* LineReader::find_newline() const {

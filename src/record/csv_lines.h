@@ -6,33 +6,47 @@
 #include <iosfwd>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace backlash::record {
 
+/// Where in a file something was read, for messages: "run.csv:17", "run.json, entry 17".
+class Place {
+ public:
+  Place(std::string name, std::string before) : name_(std::move(name)), before_(std::move(before)) {}
+
+  std::size_t number() const { return number_; }
+  std::string text(std::size_t number) const {
+    return before_ == ":" ? "line " + std::to_string(number) : before_.substr(2) + std::to_string(number);
+  }
+  void go_to(std::size_t number) { number_ = number; }
+
+  [[noreturn]] void fail(const std::string& reason) const { fail_at(number_, reason); }
+  [[noreturn]] void fail_at(std::size_t number, const std::string& reason) const;
+
+ private:
+  std::string name_, before_;
+  std::size_t number_ = 0;
+};
+
 /// Lines of a stream in pieces of bounded size: a device or a file without line ends must not fill the
 /// memory.
-class LineReader {
+class LineReader : public Place {
  public:
   LineReader(std::istream& in, const std::string& name)
-      : in_(in), name_(name), buffer_(std::size_t{1} << 16, '\0') {}
+      : Place(name, ":"), in_(in), buffer_(std::size_t{1} << 16, '\0') {}
 
   /// The next line without its end; valid until the next call. False at the end of the stream.
   bool next(std::string_view& line);
-
-  std::size_t number() const { return number_; }
-
-  [[noreturn]] void fail(const std::string& reason) const { fail_at(number_, reason); }
-  [[noreturn]] void fail_at(std::size_t line, const std::string& reason) const;
 
  private:
   const char* find_newline() const;
   bool refill();
 
   std::istream& in_;
-  const std::string name_;
   std::string buffer_;
-  std::size_t begin_ = 0, filled_ = 0, number_ = 0;
+  std::size_t begin_ = 0, filled_ = 0;
 };
 
 /// "'text'", for messages.

@@ -81,24 +81,24 @@ ParsedNumber StampReader::read(std::string_view text) {
   return {unit_.si(static_cast<double>(stamp.whole - first_->whole) + (stamp.part - first_->part)), nullptr};
 }
 
-bool RowTimes::accept(double stamp, const std::string& name, std::string_view text, const LineReader& lines) {
+bool RowTimes::accept(double stamp, const std::string& name, std::string_view text, const Place& place) {
   switch (stamps_.next(stamp)) {
     case StampVerdict::accept:
       times.push_back(stamp);
       return true;
     case StampVerdict::repeated:
-      if (first_repeated_line_ == 0) first_repeated_line_ = lines.number();
+      if (first_repeated_.empty()) first_repeated_ = place.text(place.number());
       return false;
     case StampVerdict::backwards:
       break;
   }
-  lines.fail(printable(name) + " = " + in_quotes(text) + ": goes back, the row before has " +
+  place.fail(printable(name) + " = " + in_quotes(text) + ": goes back, the row before has " +
              to_text(stamps_.last()) + " s");
 }
 
 std::vector<std::string> RowTimes::warnings() const {
   std::vector<std::string> warnings;
-  const std::string repeated = stamps_.describe("line " + std::to_string(first_repeated_line_));
+  const std::string repeated = stamps_.describe(first_repeated_);
   if (!repeated.empty()) warnings.push_back(repeated);
   for (std::string& warning : describe_time_base(times)) warnings.push_back(std::move(warning));
   return warnings;

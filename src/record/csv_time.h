@@ -45,7 +45,7 @@ class StampReader {
 class RowTimes {
  public:
   /// False for a repeated stamp, whose row is dropped; throws BadData for one that goes back.
-  bool accept(double stamp, const std::string& name, std::string_view text, const LineReader& lines);
+  bool accept(double stamp, const std::string& name, std::string_view text, const Place& place);
 
   std::vector<double> times;
   std::vector<std::string> warnings() const;
@@ -53,7 +53,7 @@ class RowTimes {
 
  private:
   StampChecker stamps_;
-  std::size_t first_repeated_line_ = 0;
+  std::string first_repeated_;  // where
 };
 
 }  // namespace backlash::record

@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A CSV with names and units of its own, read by a channel map.
+// A CSV with names and units of its own, or none, read by a channel map.
 #pragma once
 
 #include <cstddef>
 #include <iosfwd>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "backlash_diagnosis/record/channel_map.h"
 #include "backlash_diagnosis/record/record.h"
-#include "backlash_diagnosis/record/unit.h"
-#include "csv_decimal.h"
 #include "csv_lines.h"
-#include "csv_time.h"
+#include "mapped_rows.h"
 
 namespace backlash::record {
 
@@ -22,7 +19,8 @@ class MappedCsv {
  public:
   MappedCsv(std::istream& in, const std::string& name, const ChannelMap& map);
 
-  /// Whether one of the first lines has all columns of the map; the rows follow.
+  /// Whether one of the first lines, or two of them together, has all columns of the map, or numbers where
+  /// the map says columns by number; the rows follow.
   bool find_header();
 
   /// After find_header() without success: whether the file begins as one in the package's own format, else
@@ -34,37 +32,23 @@ class MappedCsv {
   Record read();
 
  private:
-  struct Column {
-    const ColumnSource* source;
-    std::string key;  // "motor_position", as in the map
-    std::size_t place = 0;
-    std::string name = {};  // in the header
-    const Unit* unit = nullptr;
-    std::vector<double>* target = nullptr;  // of the time: none
-  };
-
+  bool is_header(std::string_view line);
+  bool is_two_lines(std::string_view line);
   bool holds_all_columns(std::string_view line, char separator);
-  std::string find_column(Column& column) const;
-  bool is_units_row() const;
-  void resolve_units(bool row);
-  const Unit* unit_of(const Column& column, std::string_view row) const;
-  void check_kind(const Column& column, std::size_t line) const;
+  bool is_first_row(std::string_view line);
+  bool has_numbers(const std::vector<std::string>& row, char separator) const;
   void read_row(std::string_view line);
-  double read_field(const Column& column);
-  [[noreturn]] void fail_unit(std::size_t line, const Column& column, std::string_view unit,
-                              const std::string& reason) const;
 
   LineReader lines_;
   const std::string name_;
-  const ChannelMap& map_;
-  Record record_;
-  std::vector<Column> columns_;  // the first is the time
+  MappedRows rows_;
+  bool by_number_;  // all columns
   char separator_ = ',';
-  std::vector<std::string> header_, fields_;
-  std::size_t header_line_ = 0;
-  DecimalMark mark_;
-  RowTimes rows_;
-  std::optional<StampReader> clock_;
+  std::vector<std::string> header_, units_, fields_;
+  std::string previous_;   // line
+  std::string first_row_;  // that was read to see that it is one
+  std::size_t header_line_ = 0, units_line_ = 0;
+  bool resolved_ = false;
 
   // The line that looked most like the header.
   bool first_line_is_own_ = false;

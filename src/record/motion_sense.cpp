@@ -243,9 +243,10 @@ void look_at_model_torque(const DrivenMotion& m, const Driven& d, std::vector<Fi
   for (std::size_t i = 0; i < by_place.size(); ++i) by_place[i] = i;
   std::sort(by_place.begin(), by_place.end(),
             [&](std::size_t i, std::size_t j) { return m.motor[i] < m.motor[j]; });
-  // A motion whose acceleration is a function of the place, as one sine, tells nothing.
+  // A motion whose acceleration is a function of the place, as one sine, shows nothing. In the band: noise of
+  // the torque is no friction.
   if (between_directions(d.acceleration, d.speed, by_place) < kExplainsNot ||
-      between_directions(m.torque, d.speed, by_place) > kOfPosition * kOfPosition)
+      between_directions(d.torque, d.speed, by_place) > kOfPosition * kOfPosition)
     return;
   refuse(found, FindingKind::dead, "motor_torque",
          "motor_torque is a function of motor_position alone, the same in both directions of motion: the "

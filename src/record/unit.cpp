@@ -47,6 +47,8 @@ constexpr Unit kUnits[] = {
     {"\u00b0/s", Q::velocity, kAngular, kDegree, false},
     {"rpm", Q::velocity, kAngular, kPi / 30, false},
     {"1/min", Q::velocity, kAngular, kPi / 30, false},
+    {"Hz", Q::velocity, kAngular, 2 * kPi, false},  // turns per second
+    {"rev/s", Q::velocity, kAngular, 2 * kPi, false},
     {"m/s", Q::velocity, kLinear, 1, false},
     {"mm/s", Q::velocity, kLinear, 1e3, kDivides},
     {"rad/s^2", Q::acceleration, kAngular, 1, false},
@@ -68,6 +70,9 @@ constexpr Unit kUnits[] = {
     {"A", Q::current, kLinear, 1, false},
     {"mA", Q::current, kLinear, 1e3, kDivides},
     {"raw", Q::raw, kLinear, 1, false},
+    {"V", Q::raw, kLinear, 1, false},
+    {"mV", Q::raw, kLinear, 1e3, kDivides},
+    {"%", Q::raw, kLinear, 1e2, kDivides},  // of a rated value, which is the scale
 };
 
 Quantity quantity_of(Channel channel) {

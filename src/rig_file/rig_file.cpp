@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/yaml_tree.h"
-#include "backlash_diagnosis/rig_file/channels.h"
+#include "backlash_diagnosis/record/channels.h"
 #include "backlash_diagnosis/rig_file/declared_uncertainty.h"
 #include "backlash_diagnosis/rig_file/known_values.h"
 #include "default_rig.h"
@@ -221,7 +221,7 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
   file.digest = digest_of(text);
   yaml.integer("schema_version", 1, 1);
   file.rig = model::read_rig(yaml);
-  file.channels = read_channels(yaml, file.rig.joint, file.rig.linear);
+  file.channels = record::read_channels(yaml, file.rig.joint, file.rig.linear);
   file.simulation = simulation::read_simulation_settings(yaml);
   check_excitation(yaml.map("excitation"), file.simulation.excitation, file.rig);
   file.test_runs = read_test_runs(yaml, file.rig);

@@ -20,7 +20,7 @@ Command command() {
       "Says what a recording is, channel by channel, what is wrong with it and where, and which commands and "
       "methods it "
       "serves: the first thing to run on a recording of your own.";
-  c.positional = {"RECORD.{csv,bag,mcap,db3}"};
+  c.positional = {"RECORD.{csv,bag,mcap,db3,json,npz}"};
   c.options = {
       {"rig", "RIG.yaml", "rig file of the joint or arm: signs, units and methods are held against it"},
       {"json", "OUT.json", "report to write"},

@@ -9,6 +9,8 @@
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/for_arm.h"
+#include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
@@ -19,11 +21,12 @@ Command command() {
   c.name = "convert_record";
   c.summary =
       "Converts a record between CSV, bag and MCAP (sensor_msgs/JointState on /joint_states) and reads "
-      "recordings of ROS 2 (MCAP, rosbag2's SQLite file or its folder); times and values survive the way "
+      "recordings of ROS 2 (MCAP, rosbag2's SQLite file or its folder) and what `channels` of a rig file "
+      "describe (CSV, JSON, .npz); times and values survive the way "
       "there and back.";
-  c.positional = {"IN.{csv,bag,mcap,db3}", "OUT.{csv,bag,mcap}"};
+  c.positional = {"IN.{csv,bag,mcap,db3,json,npz}", "OUT.{csv,bag,mcap}"};
   c.options = {
-      {"rig", "RIG.yaml", "rig file whose joint the bag has"},
+      {"rig", "RIG.yaml", "rig file of the joint or arm: its names, and which columns are its channels"},
       {"joint", "NAME",
        "joint in the bag, its names are NAME_motor, NAME_sensor, NAME_load, NAME_current and "
        "NAME_accelerometer; default: the rig's, "
@@ -61,6 +64,10 @@ int convert(const Arguments& arguments) {
   const std::string &in = arguments.positional(0), &out = arguments.positional(1);
   check_record_path(in);
   check_written_path(out);
+  if (arguments.has("rig") && rig_file::is_arm_rig(arguments.text("rig"))) {
+    RecordDoor door("convert_record");
+    return run_for_arm(arguments, door);
+  }
   BagPlace place;
   if (arguments.has("rig")) place = place_of(rig_file::load_rig_file(arguments.text("rig")));
   if (arguments.has("joint") || arguments.has("topic")) place.channels.declared = false;

@@ -37,7 +37,7 @@ Command command() {
   Command c;
   c.name = "diagnose_record";
   c.summary = "Estimates the backlash in a record by all methods that it can serve and grades it.";
-  c.positional = {"RECORD.{csv,bag,mcap,db3}"};
+  c.positional = {"RECORD.{csv,bag,mcap,db3,json,npz}"};
   c.options = {
       {"json", "OUT.json", "report to write; '-' writes it to standard output instead of the summary", true},
       {"report", "OUT.html", "page for people: verdict, estimates, plots, and how it came about"},
@@ -190,6 +190,22 @@ Inputs read_inputs(const Arguments& arguments, RecordDoor& door) {
   return in;
 }
 
+constexpr double kCrossed = 0.004;  // s; choice: a gap is crossed in some ms, and needs several samples
+
+/// Of one inertia nothing can have play, and its one encoder would not show any.
+std::string no_play_seen(const Inputs& in) {
+  const double interval = in.record.sampling_interval();
+  std::string text =
+      "the rig file is of one inertia (mesh: rigid) with one encoder: the play of a gear before or behind "
+      "that encoder "
+      "cannot be seen from there";
+  if (interval > kCrossed)
+    text += fmt::format(", nor at {:.3g} Hz, in whose intervals of {:.3g} ms a gap is crossed", 1 / interval,
+                        1e3 * interval);
+  return text + "; an encoder on the motor and one on the load would show it" +
+         (interval > kCrossed ? fmt::format(", at {:.3g} Hz or more", 1 / kCrossed) : "");
+}
+
 /// Says what is missing in the words of this command.
 void explain(diagnosis::Diagnosis& diagnosis, const Inputs& in) {
   for (diagnosis::Estimate& e : diagnosis.estimates) {
@@ -198,8 +214,11 @@ void explain(diagnosis::Diagnosis& diagnosis, const Inputs& in) {
     if (!in.rig && by_curve && !in.curve) e.message = "needs --rig or --curve";
     if (!in.rig && !by_curve) e.message = "needs --rig";
     if (by_curve && !in.no_curve.empty()) e.message = "no monitoring curve: " + in.no_curve;
+    if (in.rig && in.rig->rig.mesh.rigid) e.message = no_play_seen(in);
   }
   diagnosis.verdict = diagnosis::combine(diagnosis.estimates, in.settings.limits, in.baseline);
+  if (in.rig && in.rig->rig.mesh.rigid && diagnosis.verdict.estimate < 0)
+    diagnosis.verdict.message = "cannot tell: " + no_play_seen(in);
 }
 
 void check_outputs(const Arguments& arguments) {

@@ -10,6 +10,7 @@ import sqlite3
 import struct
 import sys
 
+import numpy
 import rosbag
 import rospy
 from sensor_msgs.msg import JointState
@@ -48,6 +49,10 @@ RECORDS = ["time,motor_torque\n0,1\n0.001,2\n", "time,motor_position,load_positi
            "time [ms],motor_position (deg)\n0,1\n2,3\n", "# bench\nt [ms];phi [deg];Iq\n0;1,5;2\n1;2,5;3\n",
            "t\tphi\tIq\n[s]\tarcmin\t\n1700000000.25\t1\t2\n1700000000.5\t1\t2\n",
            "\"t [hh:mm:ss]\",phi [rad],Iq,\"a \"\"b\"\", c\"\n9:00:00.5,1,2,\n9:00:01,1,2,\"x\"\n"]
+TABLES = ["\"(1, 0.5)\" 65535 7\n(1,2) 3 4 \ninf 5 6\n", "# bench\n\"(1, 0.5)\",65535,7\n\"[1 2]\",3,4,\n",
+          "Axis\nt,A,B,C\nms,q,duty,supply\n0,[1 2],3,4\n0.5,(3;4),65000,nan\n",
+          '{"mass": 1, "entries": [{"t": 0, "q": [1, 2], "duty": 65535, "supply": 7.5}, {"t": 1, "q": NaN, "duty": 1, "supply": 1}]}',
+          '{"t": [0, 1], "q": [[1, 2], [3, 4]], "duty": [1, 2], "supply": [true, null]}', "[{\"t\": 1e9}]"]
 
 
 def write(folder, name, text):
@@ -131,6 +136,12 @@ def main(config, out):
         write(os.path.join(out, "curve"), name, text)
     for number, text in enumerate(RECORDS):
         write(os.path.join(out, "csv"), "record_%d" % number, text)
+    for number, text in enumerate(TABLES):
+        write(os.path.join(out, "table"), "table_%d" % number, text)
+    q = numpy.arange(8.).reshape(4, 2)
+    for save in (numpy.savez, numpy.savez_compressed):
+        save(os.path.join(out, "table", save.__name__ + ".npz"), t=q[:, 0], q=numpy.asfortranarray(q), duty=q[:, 1].astype(">u2"),
+             supply=q[:, 1].astype("f4"))
     write_recordings(os.path.join(config, "..", "test", "data", "recording"), os.path.join(out, "recording"))
     rng = random.Random(1)
     for number in range(8):

@@ -17,6 +17,7 @@
 // LLVMFuzzerTestOneInput of each fuzzer, renamed by the build.
 extern "C" {
 int fuzz_csv(const std::uint8_t* data, std::size_t size);
+int fuzz_table(const std::uint8_t* data, std::size_t size);
 int fuzz_rig(const std::uint8_t* data, std::size_t size);
 int fuzz_curve(const std::uint8_t* data, std::size_t size);
 int fuzz_recording(const std::uint8_t* data, std::size_t size);
@@ -97,6 +98,10 @@ class Fuzz : public testing::Test {
 
 TEST_F(Fuzz, Csv) {
   try_all("csv", fuzz_csv);
+}
+
+TEST_F(Fuzz, Table) {
+  try_all("table", fuzz_table);
 }
 
 TEST_F(Fuzz, Rig) {

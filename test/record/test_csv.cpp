@@ -107,7 +107,9 @@ TEST(Csv, MalformedHeadersAreRefusedWithPlaceAndReason) {
   const std::string known =
       "known are time, motor_torque, motor_position, motor_velocity, load_position, load_velocity, "
       "sensor_torque, "
-      "reference_position, motor_current, acceleration, output_torque";
+      "reference_position, motor_current, acceleration, output_torque; a file with names of its own, or "
+      "none, "
+      "is read by `channels` of a rig file (--rig)";
   const std::string needed =
       "no torque, position, speed of the motor, current or acceleration: needs at least one of motor_torque, "
       "sensor_torque, "

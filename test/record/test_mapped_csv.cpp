@@ -175,14 +175,16 @@ TEST(MappedCsv, WhatIsNotPlainlyRightIsRefusedWithItsPlace) {
        "Iq[A], "
        "EncoderAngle [deg], note"},
       {"Iq[A]," + kHeader + "1," + kRows,
-       "bench.csv:1: column 'Iq[A]' of channels.motor_torque: there twice: Iq[A], t [ms], Motor Speed (rpm), "
-       "Iq[A], EncoderAngle [deg], Temperature [K], note"},
+       "bench.csv:1: column 'Iq[A]' of channels.motor_torque: there twice (a number, from 1, says which): "
+       "Iq[A], t "
+       "[ms], Motor Speed (rpm), Iq[A], EncoderAngle [deg], Temperature [K], note"},
       {kHeader, "bench.csv: no data: there are only column names"},
       {kHeader + "0,60,2,180,1\n",
        "bench.csv:2: 5 fields in '0,60,2,180,1', expected 6: t [ms], Motor Speed (rpm), Iq[A], EncoderAngle "
        "[deg], Temperature [K], note"},
       {kHeader + "0,60,,180,,\n", "bench.csv:2: Iq[A] = '': empty"},
-      {kHeader + "0,60,2,180,,\n1,60,nan,180,,\n", "bench.csv:3: Iq[A] = 'nan': not a finite number"},
+      {kHeader + "0,60,nan,180,,\n1,60,inf,180,,\n",
+       "bench.csv: no row has a number in all columns: Iq[A] = 'nan', in line 2"},
       {kHeader + "0,60,2,1e400,,\n",
        "bench.csv:2: EncoderAngle [deg] = '1e400': too large or too small for a double"},
       {kHeader + "0,60,\"2,5\",180,,\n", "bench.csv:2: Iq[A] = '2,5': not a number"},  // between commas

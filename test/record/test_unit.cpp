@@ -46,7 +46,7 @@ TEST(Unit, ValuesInSi) {
 }
 
 TEST(Unit, NothingElseIsKnown) {
-  for (const char* unit : {"", "nm", "NM", "Deg", "degree", "lbf in", "V", "RPM", "s ", "m s"})
+  for (const char* unit : {"", "nm", "NM", "Deg", "degree", "lbf in", "VA", "RPM", "s ", "m s"})
     EXPECT_EQ(find_unit(unit), nullptr) << unit;
 }
 

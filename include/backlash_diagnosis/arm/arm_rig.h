@@ -4,10 +4,10 @@
 //   k_j s_j(t + d_j) = tau_j(q, v, a) + J_j a_j + friction_j + what `effects` say, see joint_effect.h
 //   friction_j = c_j S + b_j v + n_j v |v| + h_j v^3 + o_j + l_j S |tau_j|,   S = tanh(v / v_0)
 //
-// s_j is the recorded channel: a current with k_j [N m/A], or a torque with k_j = 1; later than the motion by
-// d_j. tau_j is the chain's own torque, all at the joint's side of the reduction. Friction that follows the
-// load: e.g. Gautier and Jubien, IROS 2014; quadratic and cubic in speed: what a lubricated gear shows beyond
-// one line.
+// s_j is the recorded channel: a current with k_j [N m/A], or a torque with k_j = 1, the motor's or behind
+// the gear; later than the motion by d_j. tau_j is the chain's own torque, all at the joint's side of the
+// reduction. Friction that follows the load: e.g. Gautier and Jubien, IROS 2014; quadratic and cubic in
+// speed: what a lubricated gear shows beyond one line.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@
 #include "backlash_diagnosis/arm/chain.h"
 #include "backlash_diagnosis/arm/joint_effect.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
-#include "backlash_diagnosis/record/record.h"
+#include "backlash_diagnosis/record/channel_map.h"
 
 namespace backlash::arm {
 
@@ -42,6 +42,7 @@ struct JointDrive {
   double delay = 0;                  // d [s]
   std::vector<JointEffect> effects;  // that it shows beside the terms; as declared, never fitted
   double friction_speed = 0;         // v_0 of its own friction [rad/s]; 0: as of the whole rig
+  record::ChannelMap channels;       // columns of a file with names of its own; none: the package's own names
   double training_error = 0;         // norm(r) / norm(s - mean(s)) where a fitted rig was fitted; 0: not said
 };
 

@@ -50,6 +50,10 @@
 // The shares are set by simulation, see test_rig_estimators.cpp, and for loads that move by the machines of
 // scripts/trace_machines.sh (doc/reference/estimators.md).
 //
+// A record that holds one torque and then another, with too few moves for all this, is read at rest: the
+// distance of motor minus load between the two (rest_levels.h), with what the teeth yield by, which
+// `deflection` bounds and `components` take off.
+//
 // Where the play depends on the position of the load, the interval is widened to the least and the largest
 // play over the travel; backlash_angle is then the mean over the windows.
 #pragma once

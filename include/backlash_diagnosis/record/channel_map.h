@@ -5,8 +5,10 @@
 //
 //   channel = scale * field + offset
 //   channel = scale * (column in SI) + offset
+//   channel = scale * (sum or product of columns, in SI) + offset
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -36,21 +38,27 @@ struct ChannelSource {
   bool optional = false;  // a record without it is read as well
 };
 
-/// A column of a CSV that has names and units of its own.
+/// A column of a file that has names and units of its own, or what is computed from several of them.
 struct ColumnSource {
-  Channel channel = Channel::motor_position;  // means nothing for the time
-  std::string column;                         // as in the header, with or without the unit there
-  std::string unit;                           // where the file does not say it (record/unit.h)
-  std::optional<double> scale;                // unit of the channel over the SI unit of the column, != 0
-  double offset = 0;                          // unit of the channel
+  Channel channel = Channel::motor_position;  // means nothing for the time and for parts of a sum or product
+  std::string column;       // as in the header, with or without the unit there; else its number, from 1
+  std::size_t element = 0;  // of a column with several numbers in a field, "(1, 2, 3)", from 1; 0: it has one
+  int bits = 0;             // of a signed number that the file holds as one without a sign; 0: it does not
+  std::string unit;         // where the file does not say it (record/unit.h); of a computed one always
+  std::optional<double> scale;             // unit of the channel over the SI unit of the column, != 0
+  double offset = 0;                       // unit of the channel
+  std::vector<ColumnSource> sum, product;  // of these, in SI units, instead of a column
+
+  bool is_computed() const { return !sum.empty() || !product.empty(); }
 };
 
 struct ChannelMap {
   std::string joint;  // what the joint is called in answers
   std::vector<ChannelSource> sources;
   bool declared = false;  // `sources` by the rig file or a parameter; else the names that this package gives
-  std::vector<ColumnSource> columns;  // of a CSV; empty: the package's own format only
-  ColumnSource time;                  // of the same CSV
+  std::vector<ColumnSource> columns;  // of a CSV, JSON or .npz; empty: the package's own format only
+  ColumnSource time;                  // of the same file
+  double rate = 0;                    // Hz, of a file whose rows have no time; 0: `time` says it
   bool linear = false;                // the axis: m and N for rad and N m
 
   /// All topics, that of the motor's position (else of the first source) first: its stamps count.
@@ -75,9 +83,10 @@ extern const std::string kTimeColumn;  ///< "time", of a CSV in the package's ow
 bool is_own_column(std::string_view name);
 
 /// Throws InvalidParameter for a channel twice, no channel that shows backlash, an empty name or topic, a
-/// scale of 0, a scale or offset that is not finite; of columns also for none with the time, a unit that is
-/// unknown or of another kind, and one of the package's own names (`time`, `motor_position`) that means
-/// anything but what it is: no file in the package's own format may be read as something else.
+/// scale of 0, a scale or offset that is not finite; of columns also for none with the time and no rate, a
+/// unit that is unknown or of another kind, a sum or product without one, and one of the package's own names
+/// (`time`, `motor_position`) that means anything but what it is: no file in the package's own format may be
+/// read as something else.
 void check(const ChannelMap& map);
 
 }  // namespace backlash::record

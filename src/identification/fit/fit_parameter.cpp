@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fit_parameter.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
@@ -46,9 +47,10 @@ FitParameter term_parameter(std::size_t term, const std::string& name, const mod
   const std::string id = rig.terms.at(term)->id;
   for (const ParameterSpec& spec : model::term_type(id).parameters) {
     if (spec.name != name) continue;
-    const auto set = [term, name](model::Rig& changed, double value) {
+    // A step of the fit beyond what the term can be is one to its bound.
+    const auto set = [term, name, most = spec.range.upper](model::Rig& changed, double value) {
       ParameterValues values = changed.terms[term]->values;
-      values[name] = value;
+      values[name] = std::min(value, most);
       changed.terms[term] = model::make_term(changed.terms[term]->id, values);
     };
     const bool positive = spec.range.lower == 0 && rig.terms[term]->values.at(name) > 0;

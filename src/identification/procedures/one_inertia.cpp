@@ -24,14 +24,20 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kLargestDelay = 2;   // choice: sampling intervals
-constexpr int kDelayBits = 12;        // choice: the search ends within 0.001 of an interval
-constexpr double kVagueDelay = 1;     // choice: sampling intervals of standard error
-constexpr double kLeastPeriods = 40;  // choice: of the cutoff
-constexpr double kPeriods = 100;      // choice: where the cutoff is chosen
-constexpr double kLeastShare = 0.05;  // choice: of the samples in each direction
-constexpr double kStanding = 4;       // choice: standard deviations of the speed's noise
-constexpr double kSignNoise = 1e-3;   // choice: of the speed: how sharply its sign is taken
+constexpr double kLargestDelay = 2;  // choice: sampling intervals, ...
+constexpr double kDelayPeriods =
+    0.2;  // choice: ... or of a period of the cutoff, where inertia and drag look alike at a quarter
+constexpr int kDelayBits = 12;         // choice: the search ends within 0.001 of an interval
+constexpr double kVagueDelay = 1;      // choice: sampling intervals of standard error
+constexpr double kLeastPeriods = 40;   // choice: of the cutoff
+constexpr double kPeriods = 100;       // choice: where the cutoff is chosen
+constexpr double kFewestPeriods = 20;  // choice: where half the band says another inertia
+constexpr double kSmoothed = 2;        // choice: times that lower cutoff, to which its columns are smoothed
+constexpr double kAnother = 2;         // theory: standard errors, 95 %
+constexpr double kSurer = 0.5;         // choice: times the error of the whole band
+constexpr double kLeastShare = 0.05;   // choice: of the samples in each direction
+constexpr double kStanding = 4;        // choice: standard deviations of the speed's noise
+constexpr double kSignNoise = 1e-3;    // choice: of the speed: how sharply its sign is taken
 constexpr double kShowing = 0.05;     // choice: of the speed: noise that hides its sign (kStanding) only near
                                       // standstill
 constexpr double kSignBandwidth = 4;  // choice: but not below four times the cutoff
@@ -47,7 +53,7 @@ struct Signals {
   double position_noise = 0, position_error = 0;  // rad, white alone and with the rounding
   std::vector<double> time, torque,
       slides;  // torque as a second difference sees it; 1 where the motor slides for sure, else 0
-  Eigen::MatrixXd columns;         // a, v, sign(v), 1 where it slides, filtered; all samples
+  Eigen::MatrixXd columns;  // a, v, sign(v), 1 [, sin(q), cos(q)] where it slides, filtered; all samples
   std::vector<Eigen::Index> used;  // samples
 };
 
@@ -95,7 +101,7 @@ void require_channels(const record::Record& record) {
     throw CannotIdentify(record.name + ": only " + std::to_string(record.size()) + " samples");
 }
 
-/// White noise of the position, differentiated up to a cutoff: the square of the gain 2 pi f integrated.
+/// White noise of the position, differentiated up to a cutoff: the square of 2 pi f integrated.
 double speed_noise(double position_noise, double cutoff, double interval) {
   return position_noise * 2 * M_PI * cutoff * std::sqrt(2 * cutoff * interval / 3);
 }
@@ -115,24 +121,37 @@ record::EvenGrid even(const record::Record& recorded, const std::vector<bool>& l
   return grid;
 }
 
-Signals prepare(const record::EvenGrid& grid, double cutoff) {
+/// Of the position, as a second difference of the torque sees it.
+std::vector<double> weight_column(const std::vector<double>& position, double phase) {
+  std::vector<double> out;
+  for (const double q : position) out.push_back(std::sin(q + phase));
+  return over_second_difference(out);
+}
+
+/// `smoothed` [Hz]: as in OneInertia.
+Signals prepare(const record::EvenGrid& grid, double cutoff, bool gravity, double smoothed) {
   const record::Record& record = grid.record;
   Signals s;
-  const std::vector<double>& position = record.column(record::Channel::motor_position);
+  const std::vector<double>& recorded = record.column(record::Channel::motor_position);
   const std::size_t n = record.size();
   const double t = s.interval = record.sampling_interval();
+  const auto smooth = [&](std::vector<double> x) {
+    return smoothed > 0 && smoothed < 0.4 / t ? signal::low_pass(x, t, smoothed) : x;
+  };
+  const std::vector<double> position = smooth(recorded);
   if (cutoff != 0 && !(cutoff > 0 && cutoff <= 0.4 / t))
     throw InvalidParameter("cutoff", cutoff, "must be > 0 and at most 0.4 of the sampling rate");
   s.cutoff =
-      cutoff > 0 ? cutoff : std::max(signal::motion_bandwidth(position, t), kPeriods / (double(n) * t));
-  if (double(n) * t * s.cutoff < kLeastPeriods)
+      cutoff > 0 ? cutoff : std::max(signal::motion_bandwidth(recorded, t), kPeriods / (double(n) * t));
+  if (double(n) * t * s.cutoff < (cutoff > 0 ? kFewestPeriods : kLeastPeriods))
     throw CannotIdentify(fmt::format("{}: {:.3g} s are too short for a motion of {:.3g} Hz", record.name,
                                      double(n) * t, s.cutoff));
-  s.position_noise = signal::position_noise(position);
+  // What shakes above the band is no noise: only what no band holds is.
+  s.position_noise = smoothed > 0 ? signal::white_noise(recorded) : signal::position_noise(recorded);
   // The rounding of a slow motion is no white noise, and more than what looks like it.
-  s.position_error = std::max(s.position_noise, signal::resolution(position) / std::sqrt(12.0));
+  s.position_error = std::max(s.position_noise, signal::resolution(recorded) / std::sqrt(12.0));
   s.time = record.time;
-  s.torque = over_second_difference(record.column(record::Channel::motor_torque));
+  s.torque = over_second_difference(smooth(record.column(record::Channel::motor_torque)));
   const std::vector<double> speed = signal::derivative(position, t);
   // Sharper than the noise of the speed allows nothing would be seen to slide.
   const double sharpest = std::max(s.cutoff, speed_bandwidth(s.position_noise, speed, t, kShowing));
@@ -147,12 +166,15 @@ Signals prepare(const record::EvenGrid& grid, double cutoff) {
   for (std::size_t k = 0; k < n; ++k)  // as far as a second difference of a difference sees
     for (std::size_t j = k < kSeen ? 0 : k - kSeen; j <= std::min(n - 1, k + kSeen); ++j)
       if (grid.lost[j]) s.slides[k] = 0;
-  s.columns.resize(n, 4);
-  const std::vector<double> filtered[] = {
-      low_pass_sliding(s, second_derivative(position, t)), low_pass_sliding(s, over_second_difference(speed)),
-      low_pass_sliding(s, sign), low_pass_sliding(s, std::vector<double>(n, 1))};
-  for (int i = 0; i < 4; ++i)
-    s.columns.col(i) = Eigen::Map<const Eigen::VectorXd>(filtered[i].data(), Eigen::Index(n));
+  std::vector<std::vector<double>> columns = {second_derivative(position, t), over_second_difference(speed),
+                                              sign, std::vector<double>(n, 1)};
+  if (gravity)
+    for (const double phase : {0.0, M_PI_2}) columns.push_back(weight_column(position, phase));
+  s.columns.resize(Eigen::Index(n), Eigen::Index(columns.size()));
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const std::vector<double> filtered = low_pass_sliding(s, columns[i]);
+    s.columns.col(Eigen::Index(i)) = Eigen::Map<const Eigen::VectorXd>(filtered.data(), Eigen::Index(n));
+  }
   const auto end = static_cast<std::size_t>(std::ceil(1 / (s.cutoff * t)));
   for (std::size_t k = end; k + end < n; ++k)
     if (s.slides[k] != 0) s.used.push_back(Eigen::Index(k));
@@ -181,6 +203,11 @@ void require_both_directions(const std::string& name, const Signals& s) {
         name, 100 * forward / double(s.time.size()), 100 * backward / double(s.time.size())));
 }
 
+/// Samples, to either side.
+double largest_delay(const Signals& s) {
+  return std::max(kLargestDelay, kDelayPeriods / (s.cutoff * s.interval));
+}
+
 /// Delay [samples] with the smallest residual.
 double best_delay(const Signals& s, const Eigen::MatrixXd& a) {
   const Eigen::MatrixXd q = signal::orthonormal_basis(a);
@@ -188,7 +215,8 @@ double best_delay(const Signals& s, const Eigen::MatrixXd& a) {
     const Eigen::VectorXd b = picked(low_pass_sliding(s, signal::delayed(s.torque, delay)), s.used);
     return (b - q * (q.transpose() * b)).squaredNorm();
   };
-  return boost::math::tools::brent_find_minima(left, -kLargestDelay, kLargestDelay, kDelayBits).first;
+  const double largest = largest_delay(s);
+  return boost::math::tools::brent_find_minima(left, -largest, largest, kDelayBits).first;
 }
 
 /// The delay is one more column: what the torque would gain by one sample of it.
@@ -269,8 +297,83 @@ void allow_for_missing(Solution& solution, const Signals& s, const Eigen::Matrix
   for (Eigen::Index i = 0; i < drawn.size(); ++i) solution.error[i] = std::hypot(solution.error[i], drawn[i]);
 }
 
+/// In the order of the columns.
+std::vector<signal::Measured OneInertia::*> fitted_members(bool gravity) {
+  std::vector<signal::Measured OneInertia::*> all = {&OneInertia::inertia, &OneInertia::viscous,
+                                                     &OneInertia::coulomb, &OneInertia::offset};
+  if (gravity) all.insert(all.end(), {&OneInertia::gravity_sine, &OneInertia::gravity_cosine});
+  return all;
+}
+
 double spread(const Eigen::VectorXd& values) {
   return std::sqrt((values.array() - values.mean()).square().mean());
+}
+
+}  // namespace
+
+namespace {
+
+/// The machine in one band, with its errors by noise.
+struct Read {
+  Signals signals;
+  double smoothed = 0;  // Hz
+  Eigen::MatrixXd columns;
+  Solution solution;
+  signal::Measured delay;  // s
+  std::vector<std::string> warnings;
+};
+
+Read read_band(const record::EvenGrid& grid, double cutoff, const OneInertiaOptions& options,
+               double smoothed) {
+  Read read{prepare(grid, cutoff, options.gravity, smoothed), smoothed, {}, {}, {}, {}};
+  const Signals& s = read.signals;
+  require_both_directions(grid.record.name, s);
+  if (options.delay && !(std::fabs(*options.delay) <= kLargestDelay * s.interval))
+    throw InvalidParameter("delay", *options.delay, "must be within two sampling intervals");
+  const Eigen::MatrixXd& a = read.columns = picked(s.columns, s.used);
+  if (options.delay) {
+    read.solution = solve(s, a, *options.delay / s.interval, false);
+    read.delay = {*options.delay, 0};
+    return read;
+  }
+  read.solution = solve(s, a, best_delay(s, a), true);
+  const double error = read.solution.error[a.cols()], largest = largest_delay(s);
+  read.delay = {read.solution.delay * s.interval, error * s.interval};
+  if (std::fabs(read.solution.delay) <= largest - 0.01 && error <= std::max(kVagueDelay, 0.25 * largest))
+    return read;
+  read.warnings.push_back(
+      fmt::format("the delay between torque and position cannot be told ({:.3g} +- {:.3g} samples, "
+                  "searched within {:.3g}): taken as 0",
+                  read.solution.delay, error, largest));
+  read.solution = solve(s, a, 0, false);
+  read.delay = {0, std::numeric_limits<double>::quiet_NaN()};
+  return read;
+}
+
+/// Whether half of the band says another inertia, or the same far more surely, or has a delay where all of it
+/// puts it at the edge of the search.
+bool counts_instead(const Read& half, const Read& whole) {
+  const double a = whole.solution.fit.values[0], b = half.solution.fit.values[0];
+  const double ea = whole.solution.error[0], eb = half.solution.error[0];
+  const bool delay = std::isnan(whole.delay.standard_error) && !std::isnan(half.delay.standard_error);
+  return delay || std::fabs(a - b) > kAnother * std::hypot(ea, eb) || eb < kSurer * ea;
+}
+
+/// In the widest band that agrees with its lower half.
+Read read_machine(const record::EvenGrid& grid, const OneInertiaOptions& options) {
+  Read read = read_band(grid, options.cutoff, options, 0);
+  while (options.cutoff == 0) {
+    const double half = 0.5 * read.signals.cutoff;
+    if (half * double(grid.record.size()) * read.signals.interval < kFewestPeriods) return read;
+    try {
+      Read lower = read_band(grid, half, options, kSmoothed * half);
+      if (!counts_instead(lower, read)) return read;
+      read = std::move(lower);
+    } catch (const CannotIdentify&) {  // too slow to see both directions
+      return read;
+    }
+  }
+  return read;
 }
 
 }  // namespace
@@ -279,38 +382,26 @@ OneInertia identify_one_inertia(const record::Record& recorded, const OneInertia
   require_channels(recorded);
   const record::EvenGrid grid = even(recorded, options.lost);
   const record::Record& record = grid.record;
-  const Signals s = prepare(grid, options.cutoff);
-  require_both_directions(record.name, s);
-  if (options.delay && !(std::fabs(*options.delay) <= kLargestDelay * s.interval))
-    throw InvalidParameter("delay", *options.delay, "must be within two sampling intervals");
-  const Eigen::MatrixXd a = picked(s.columns, s.used);
-  OneInertia out;
-  Solution solution;
-  if (options.delay) {
-    solution = solve(s, a, *options.delay / s.interval, false);
-    out.delay = {*options.delay, 0};
-  } else {
-    solution = solve(s, a, best_delay(s, a), true);
-    out.delay = {solution.delay * s.interval, solution.error[4] * s.interval};
-    if (std::fabs(solution.delay) > kLargestDelay - 0.01 || solution.error[4] > kVagueDelay) {
-      out.warnings.push_back(
-          fmt::format("the delay between torque and position cannot be told ({:.3g} +- {:.3g} samples, "
-                      "searched within two): taken as 0",
-                      solution.delay, solution.error[4]));
-      solution = solve(s, a, 0, false);
-      out.delay = {0, std::numeric_limits<double>::quiet_NaN()};
-    }
-  }
+  Read read = read_machine(grid, options);
+  const Signals& s = read.signals;
+  const Eigen::MatrixXd& a = read.columns;
+  Solution& solution = read.solution;
   const signal::LeastSquaresFit& fit = solution.fit;
+  OneInertia out;
+  out.delay = read.delay;
+  out.warnings = read.warnings;
+  out.gravity = options.gravity;
   out.cutoff = s.cutoff;
+  out.smoothed = read.smoothed;
   out.used = double(s.used.size()) / double(s.time.size());
   const Eigen::VectorXd predicted = a * fit.values, measured = predicted + fit.residuals;
   out.relative_error = std::sqrt(fit.residuals.squaredNorm() / double(measured.size())) / spread(measured);
   out.floor = floor_of(record, s, fit.values[0], spread(measured));
   if (out.relative_error > kMisfit * out.floor)
     allow_for_missing(solution, s, a, record, out.floor * spread(measured) * std::sqrt(double(a.rows())));
-  signal::Measured* const parameters[] = {&out.inertia, &out.viscous, &out.coulomb, &out.offset};
-  for (int i = 0; i < 4; ++i) *parameters[i] = {fit.values[i], solution.error[i]};
+  const std::vector<signal::Measured OneInertia::*> names = fitted_members(options.gravity);
+  for (std::size_t i = 0; i < names.size(); ++i)
+    out.*names[i] = {fit.values[Eigen::Index(i)], solution.error[Eigen::Index(i)]};
   for (const auto k : s.used) out.time.push_back(s.time[k]);
   out.measured.assign(measured.begin(), measured.end());
   out.predicted.assign(predicted.begin(), predicted.end());
@@ -326,12 +417,13 @@ OneInertia applied(const OneInertia& machine, const record::Record& recorded, co
   require_channels(recorded);
   const record::EvenGrid grid = even(recorded, lost);
   const record::Record& record = grid.record;
-  const Signals s = prepare(grid, machine.cutoff);
+  const Signals s = prepare(grid, machine.cutoff, machine.gravity, machine.smoothed);
   if (s.used.size() < 2) throw CannotIdentify(record.name + ": stands still");
   const Eigen::VectorXd torque =
       picked(low_pass_sliding(s, signal::delayed(s.torque, machine.delay.value / s.interval)), s.used);
-  const Eigen::Vector4d p(machine.inertia.value, machine.viscous.value, machine.coulomb.value,
-                          machine.offset.value);
+  const auto names = fitted_members(machine.gravity);
+  Eigen::VectorXd p(names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) p[Eigen::Index(i)] = (machine.*names[i]).value;
   const Eigen::VectorXd predicted = picked(s.columns, s.used) * p;
   OneInertia out = machine;
   out.used = double(s.used.size()) / double(s.time.size());
@@ -349,8 +441,7 @@ OneInertia combined(const std::vector<OneInertia>& machines) {
   if (machines.size() == 1) return all;  // whatever its errors, which may be 0 without any noise
   const bool drawn = std::any_of(machines.begin(), machines.end(),
                                  [](const OneInertia& m) { return m.relative_error > kMisfit * m.floor; });
-  for (signal::Measured OneInertia::*parameter :
-       {&OneInertia::inertia, &OneInertia::viscous, &OneInertia::coulomb, &OneInertia::offset}) {
+  for (signal::Measured OneInertia::*parameter : fitted_members(all.gravity)) {
     std::vector<signal::Measured> values;
     double least = std::numeric_limits<double>::infinity();
     for (const OneInertia& m : machines) {

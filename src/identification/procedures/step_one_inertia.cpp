@@ -5,19 +5,25 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <tuple>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/model/term.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
 #include "declared_terms.h"
 #include "procedures.h"
 
 namespace backlash::identification {
 namespace {
 
-constexpr double kByNoise = 5;  // choice: standard errors below zero, that an explained torque may have
+constexpr double kByMissing = 1;  // theory: the same where the error holds effects that the model lacks
+constexpr double kByNoise = 5;    // choice: standard errors below zero, that an explained torque may have
 
 /// The samples that were used, in their places.
 ChannelTrace trace_of(const OneInertia& found, const record::Record& record) {
@@ -38,21 +44,39 @@ ChannelTrace trace_of(const OneInertia& found, const record::Record& record) {
   return trace;
 }
 
-/// A load that the model lacks can leave it with an inertia or a friction that no machine has.
-void require_possible(const OneInertia& found, const std::string& record) {
+constexpr double kFastest = 0.99;  // quantile: choice
+
+/// rad/s, in the band of the fit.
+double fastest(const record::Record& record, double cutoff) {
+  const double interval = record.sampling_interval();
+  std::vector<double> speed =
+      signal::derivative(signal::low_pass(record.column(record::Channel::motor_position), interval,
+                                          std::min(cutoff, 0.4 / interval)),
+                         interval);
+  for (double& v : speed) v = std::fabs(v);
+  return signal::quantile(std::move(speed), kFastest);
+}
+
+/// A load that the model lacks can leave it with an inertia or a friction that no machine has. Friction may
+/// fall with the speed, as long as it does not drive.
+void require_possible(const OneInertia& found, const record::Record& measured) {
+  const std::string& record = measured.name;
   const auto refuse = [&](const char* name, const signal::Measured& m) {
     throw CannotIdentify(fmt::format(
         "{}: {} comes out as {:.3g} +- {:.2g}, and {:.3g} % of the torque is left where noise alone would "
-        "leave {:.3g} %: the machine has effects that one inertia with friction lacks, as gravity; "
+        "leave {:.3g} %: the machine has effects that one inertia with friction lacks{}; "
         "trace_residual looks for them",
-        record, name, m.value, m.standard_error, 100 * found.relative_error, 100 * found.floor));
+        record, name, m.value, m.standard_error, 100 * found.relative_error, 100 * found.floor,
+        found.gravity ? "" : ", as gravity"));
   };
   if (found.inertia.value <= 0) refuse("inertia", found.inertia);
-  // A friction that is nearly nothing may come out below zero by noise.
-  const double by_noise = found.relative_error <= kMisfit * found.floor ? kByNoise : 0;
+  // A friction that is nearly nothing may come out below zero by noise, or by what its error holds.
+  const double by_noise = found.relative_error <= kMisfit * found.floor ? kByNoise : kByMissing;
   const signal::Measured least = {found.coulomb.value - std::fabs(found.offset.value),
                                   std::hypot(found.coulomb.standard_error, found.offset.standard_error)};
-  if (found.viscous.value < -by_noise * found.viscous.standard_error) refuse("viscous", found.viscous);
+  const bool drives = least.value + found.viscous.value * fastest(measured, found.cutoff) < 0;
+  if (drives && found.viscous.value < -by_noise * found.viscous.standard_error)
+    refuse("viscous", found.viscous);
   if (least.value < -by_noise * least.standard_error) refuse("coulomb friction of the one direction", least);
 }
 
@@ -67,6 +91,21 @@ void take_off_terms(IdentificationCase& c) {
   }
 }
 
+constexpr char kGravity[] = "gravity";
+
+/// The weight that the rig declares, in sine and cosine; none where it declares no gravity.
+std::optional<std::pair<double, double>> declared_weight(const model::Rig& rig) {
+  std::optional<std::pair<double, double>> weight;
+  for (const auto& term : rig.terms) {
+    if (term->id != kGravity) continue;
+    if (!weight) weight.emplace(0, 0);
+    const double amplitude = term->values.at("amplitude"), phase = term->values.at("phase");
+    weight->first += amplitude * std::cos(phase);
+    weight->second += amplitude * std::sin(phase);
+  }
+  return weight;
+}
+
 /// A record, and the machine that it tells by itself.
 struct Told {
   const record::Record* record;
@@ -74,16 +113,25 @@ struct Told {
   const std::vector<bool>* lost;
 };
 
+/// What was found is what the declared weight, which was taken off, lacks.
+void add_weight(OneInertia& machine, const std::pair<double, double>& declared) {
+  machine.gravity_sine.value += declared.first;
+  machine.gravity_cosine.value += declared.second;
+}
+
 /// All records that tell one; what is left out is a warning. Throws CannotIdentify where none does.
 std::vector<Told> told_by_each(IdentificationCase& c) {
   std::vector<Told> all;
   std::vector<std::string> reasons;
+  const auto weight = declared_weight(c.declared);
   for (const CaseRecord& r : c.records) {
     try {
       OneInertiaOptions options;
       options.lost = r.lost;
+      options.gravity = weight.has_value();
       all.push_back({&r.record, identify_one_inertia(r.record, options), &r.lost});
-      require_possible(all.back().machine, r.record.name);
+      if (weight) add_weight(all.back().machine, *weight);
+      require_possible(all.back().machine, r.record);
     } catch (const CannotIdentify& error) {
       if (!all.empty() && all.back().record == &r.record) all.pop_back();
       reasons.emplace_back(error.what());
@@ -97,11 +145,21 @@ std::vector<Told> told_by_each(IdentificationCase& c) {
   return all;
 }
 
+/// Amplitude and phase of s sin(q) + c cos(q); their errors as of independent s and c.
+std::pair<signal::Measured, signal::Measured> weight_of(const OneInertia& m) {
+  const double s = m.gravity_sine.value, c = m.gravity_cosine.value, a = std::hypot(s, c);
+  const double es = m.gravity_sine.standard_error, ec = m.gravity_cosine.standard_error;
+  if (!(a > 0)) return {{0, std::hypot(es, ec)}, {0, std::numeric_limits<double>::infinity()}};
+  return {{a, std::hypot(s * es, c * ec) / a}, {std::atan2(c, s), std::hypot(c * es, s * ec) / (a * a)}};
+}
+
 std::map<std::string, signal::Measured> parameters_of(const OneInertia& machine) {
-  return {{"inertia", machine.inertia},
-          {"viscous", machine.viscous},
-          {"coulomb", machine.coulomb},
-          {"offset", machine.offset}};
+  std::map<std::string, signal::Measured> all = {{"inertia", machine.inertia},
+                                                 {"viscous", machine.viscous},
+                                                 {"coulomb", machine.coulomb},
+                                                 {"offset", machine.offset}};
+  if (machine.gravity) std::tie(all["gravity_amplitude"], all["gravity_phase"]) = weight_of(machine);
+  return all;
 }
 
 /// Relative, over all records: norms add up.
@@ -125,6 +183,17 @@ std::optional<SeveralMachines> contradicting(const std::vector<Told>& told, cons
   return several_machines(std::move(alone), together.error / together.floor);
 }
 
+/// One weight in place of those that were declared.
+void take_weight(const OneInertia& found, IdentificationCase& c) {
+  if (!found.gravity) return;
+  auto& terms = c.result.rig.terms;
+  terms.erase(
+      std::remove_if(terms.begin(), terms.end(), [](const auto& term) { return term->id == kGravity; }),
+      terms.end());
+  const auto [amplitude, phase] = weight_of(found);
+  terms.push_back(model::make_term(kGravity, {{"amplitude", amplitude.value}, {"phase", phase.value}}));
+}
+
 /// The values of the rig that one inertia has.
 void take_machine(const OneInertia& found, IdentificationCase& c) {
   model::Body& body = c.result.rig.motor;
@@ -142,13 +211,16 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   ProcedureReport report{"one_inertia", {}, ""};
   take_off_terms(c);
   const std::vector<Told> told = told_by_each(c);
+  const auto weight = declared_weight(c.declared);
   std::vector<OneInertia> alone, together;
   for (const Told& t : told) alone.push_back(t.machine);
   const OneInertia found = combined(alone);
   for (const Told& t : told) {
     OneInertia machine = found;
     machine.cutoff = t.machine.cutoff;
+    machine.smoothed = t.machine.smoothed;
     machine.delay = t.machine.delay;
+    if (weight) add_weight(machine, {-weight->first, -weight->second});  // the records are without it
     together.push_back(applied(machine, *t.record, *t.lost));
     report.records.push_back(t.record->name);
     c.result.torque.push_back(trace_of(together.back(), *t.record));
@@ -157,11 +229,13 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   c.result.parameters = parameters_of(found);
   for (const rig_file::RigParameter& p : rig_file::servo_parameters())
     if (!p.one_inertia.empty()) c.result.units[p.one_inertia] = model::axis_unit(p.unit, c.declared.linear);
+  if (weight) c.result.units["gravity_amplitude"] = "N m", c.result.units["gravity_phase"] = "rad";
   const ChannelError error = c.result.channels["torque"] = error_of(together);
   c.result.delay = found.delay;
   c.result.several = contradicting(told, error);
   if (c.result.several) allow_for_several(*c.result.several, c.result.parameters);
   take_machine(found, c);
+  take_weight(found, c);
   report.message = fmt::format("torque error {:.3g} %, low-pass {:.3g} Hz, torque acts {:.3g} ms late",
                                100 * error.error, found.cutoff, 1e3 * found.delay.value);
   return report;

@@ -12,6 +12,7 @@ extern "C" int backlash_run_for_arm(const Arguments& arguments, RecordDoor& door
   static const std::map<std::string, int (*)(const Arguments&, RecordDoor&)> commands = {
       {"simulate", [](const Arguments& a, RecordDoor&) { return simulate_arm(a); }},
       {"check_record", [](const Arguments& a, RecordDoor&) { return check_arm(a); }},
+      {"convert_record", [](const Arguments& a, RecordDoor&) { return convert_arm(a); }},
       {"diagnose_record", diagnose_arm},
       {"identify",
        [](const Arguments& a, RecordDoor& door) {

@@ -10,6 +10,7 @@ namespace backlash::tools {
 int simulate_arm(const Arguments& arguments);
 /// Outputs are checked already.
 int check_arm(const Arguments& arguments);
+int convert_arm(const Arguments& arguments);
 /// All its joints in one run. The exit code is that of the worst.
 int diagnose_arm(const Arguments& arguments, RecordDoor& door);
 /// Outputs are checked already. Throws CannotIdentify.

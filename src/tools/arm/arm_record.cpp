@@ -5,6 +5,7 @@
 
 #include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/record/sample_joiner.h"
+#include "backlash_diagnosis/record/table_file.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "backlash_diagnosis/ros/joint_rigs.h"
 #include "tools/common/record_file.h"
@@ -16,7 +17,11 @@ namespace fs = std::filesystem;
 std::vector<record::JointRecord> read_joints(const std::string& path, const arm::ArmRig& rig) {
   check_record_path(path);
   std::vector<record::JointRecord> joints;
-  if (fs::path(path).extension() != ".csv") {
+  const bool columns = !rig.joints.empty() && !rig.joints.front().channels.columns.empty();
+  if (record::is_table_file(path) || (columns && fs::path(path).extension() == ".csv")) {
+    for (const arm::JointDrive& joint : rig.joints)
+      joints.push_back({joint.name, record::read_table(path, joint.channels)});
+  } else if (fs::path(path).extension() != ".csv") {
     for (const arm::JointDrive& joint : rig.joints)
       joints.push_back({joint.name, ros_bridge::read_robot_bag(
                                         path, ros_bridge::robot_channels(joint.name, rig.channel))});

@@ -12,6 +12,7 @@
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/record/table_file.h"
 #include "backlash_diagnosis/recording/recording.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "tools/common/command_line.h"
@@ -47,9 +48,18 @@ class SignalsBlocked {
 const std::string kDefaultJoint = "joint";
 
 void check_record_path(const std::string& path) {
-  if (!ends_in(path, ".csv") && !ends_in(path, ".bag") && !recording::is_recording(path))
-    throw UsageError("'" + printable(path, 4096) +
-                     "': a record must end in .csv, .bag, .mcap or .db3 or be a folder of rosbag2");
+  const std::string name = printable(path, 4096);
+  if (ends_in(path, ".parquet"))
+    throw UsageError(
+        "'" + name +
+        "': Parquet is not read; as a CSV it is: python3 -c \"import pandas; pandas.read_parquet('" + name +
+        "').to_csv('" + printable(fs::path(path).replace_extension(".csv").string(), 4096) +
+        "', index=False)\"");
+  if (!ends_in(path, ".csv") && !ends_in(path, ".bag") && !record::is_table_file(path) &&
+      !recording::is_recording(path))
+    throw UsageError(
+        "'" + name +
+        "': a record must end in .csv, .bag, .mcap, .db3, .json or .npz or be a folder of rosbag2");
 }
 
 void check_written_path(const std::string& path) {
@@ -67,6 +77,7 @@ BagPlace place_of(const rig_file::RigFile& file) {
 record::Record read_record(const std::string& path, const BagPlace& place) {
   check_record_path(path);
   if (ends_in(path, ".csv")) return record::read_csv(path, place.channels, place.joint);
+  if (record::is_table_file(path)) return record::read_table(path, place.channels);
   return place.channels.declared ? ros_bridge::read_bag(path, place.channels)
                                  : ros_bridge::read_bag(path, place.joint, place.topic);
 }

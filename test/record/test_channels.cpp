@@ -2,20 +2,20 @@
 #include <gtest/gtest.h>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/rig_file/channels.h"
+#include "backlash_diagnosis/record/channels.h"
 
-namespace backlash::rig_file {
+namespace backlash::record {
 namespace {
 
-record::ChannelMap parse(const std::string& text) {
+ChannelMap parse(const std::string& text) {
   const YamlReader yaml = YamlReader::from_text(text, "rig.yaml");
-  const record::ChannelMap map = read_channels(yaml, "elbow");
+  const ChannelMap map = read_channels(yaml, "elbow");
   yaml.finish();
   return map;
 }
 
 TEST(Channels, AreReadWithTheirDefaults) {
-  const record::ChannelMap map = parse(
+  const ChannelMap map = parse(
       "channels:\n"
       "  motor_position: {name: elbow_joint}\n"
       "  motor_torque: {name: elbow_joint, scale: 11.7}\n"
@@ -23,31 +23,31 @@ TEST(Channels, AreReadWithTheirDefaults) {
       "  load_position: {topic: /link/encoders, name: elbow, scale: -1}\n");
   EXPECT_TRUE(map.declared);
   ASSERT_EQ(map.sources.size(), 4u);  // in the order of the channels
-  EXPECT_EQ(map.sources[0].channel, record::Channel::motor_torque);
-  EXPECT_EQ(map.sources[0].field, record::Field::effort);
+  EXPECT_EQ(map.sources[0].channel, Channel::motor_torque);
+  EXPECT_EQ(map.sources[0].field, Field::effort);
   EXPECT_EQ(map.sources[0].scale, 11.7);
   EXPECT_EQ(map.sources[1].topic, "joint_states");
-  EXPECT_EQ(map.sources[1].field, record::Field::position);
+  EXPECT_EQ(map.sources[1].field, Field::position);
   EXPECT_EQ(map.sources[2].topic, "/link/encoders");
-  EXPECT_EQ(map.sources[3].field, record::Field::velocity);
+  EXPECT_EQ(map.sources[3].field, Field::velocity);
   EXPECT_EQ(map.sources[3].offset, 0.5);
 }
 
 TEST(Channels, AreThoseOfThisPackageWhereNoneAreTold) {
-  const record::ChannelMap map = parse("{}\n");
+  const ChannelMap map = parse("{}\n");
   EXPECT_FALSE(map.declared);
   EXPECT_EQ(map.sources.front().name, "elbow_motor");
 }
 
 TEST(Channels, MayBeColumnsOfACsv) {
-  const record::ChannelMap map = parse(
+  const ChannelMap map = parse(
       "channels:\n"
       "  time: {column: \"t [ms]\"}\n"
       "  motor_position: {column: Encoder, unit: deg, scale: -1, offset: 0.5}\n"
       "  load_position: {column: Out, unit: deg, name: elbow}\n");
   EXPECT_TRUE(map.declared);  // for messages: load_position alone
   ASSERT_EQ(map.sources.size(), 1u);
-  EXPECT_EQ(map.sources[0].channel, record::Channel::load_position);
+  EXPECT_EQ(map.sources[0].channel, Channel::load_position);
   EXPECT_EQ(map.time.column, "t [ms]");
   ASSERT_EQ(map.columns.size(), 2u);
   EXPECT_EQ(map.columns[0].column, "Encoder");
@@ -56,7 +56,7 @@ TEST(Channels, MayBeColumnsOfACsv) {
   EXPECT_EQ(map.columns[0].offset, 0.5);
   EXPECT_FALSE(map.columns[1].scale.has_value());
 
-  const record::ChannelMap columns_only =
+  const ChannelMap columns_only =
       parse("channels:\n  time: {column: t, unit: s}\n  motor_position: {column: x, unit: rad}\n");
   EXPECT_FALSE(columns_only.declared);  // messages have the names of this package
   EXPECT_EQ(columns_only.sources.front().name, "elbow_motor");
@@ -101,4 +101,4 @@ TEST(Channels, WrongOnesAreRefusedWithTheirPlace) {
 }
 
 }  // namespace
-}  // namespace backlash::rig_file
+}  // namespace backlash::record
