@@ -208,9 +208,11 @@ function draw(joint) {
   section.dataset.joint = joint.joint;
   section.dataset.node = joint.node || "";
   put(find("h2"), joint.joint);
-  const grade = joint.grade || "";
-  section.className = "joint " + (CLASSES.includes(grade) ? grade : "");
-  put(find(".grade"), grade ? GRADES[grade] || grade : "change watch only");
+  // A joint that stands changed is none to be left alone, however little play it has.
+  const grade = joint.grade || "", changed = joint.change && joint.change.state === "standing";
+  const colour = changed && ["", "good", "ungraded", "cannot_tell"].includes(grade) ? "watch" : grade;
+  section.className = "joint " + (CLASSES.includes(colour) ? colour : "");
+  put(find(".grade"), (grade ? GRADES[grade] || grade : "change watch only") + (changed ? ", changed" : ""));
   for (const name of [".buttons", ".headline"]) find(name).hidden = joint.node === null;
   put(find(".message"), ownUnit(joint.message || "") + (joint.asked ? `, asked at ${clock(joint.asked)}` : ""));
   put(find(".change"), changeWords(joint));
@@ -239,7 +241,7 @@ function summary(joints) {
     .map(([words, names]) => `${words}: ${names.join(", ")}`);
   const changed = joints.filter(j => j.change && j.change.state === "standing").map(j => j.joint);
   if (changed.length) parts.push(`changed: ${[...new Set(changed)].join(", ")}`);
-  const good = count(["good"]).length;
+  const good = joints.filter(j => j.grade === "good" && !changed.includes(j.joint)).length;
   if (good) parts.push(`${good} of ${joints.length} good`);
   return parts.join("; ") || `${joints.length} joint${joints.length > 1 ? "s" : ""}, no limits set`;
 }
