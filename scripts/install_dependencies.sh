@@ -24,6 +24,7 @@ run=(
   libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node, for monitoring.launch; the plugins are in -dev
   ros-robot-state-publisher                                       # arm.launch
   python3-matplotlib python3-numpy python3-yaml                   # plots
+  python3-aiohttp python3-rospy                                   # dashboard
   python3-cryptography python3-distributed                        # fleet_report: Dask, with TLS between its processes
 )
 tests=(

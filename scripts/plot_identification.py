@@ -121,7 +121,9 @@ def trace(axes, detail, title, unit):
 
 
 def panels(data):
-    details, drawn = data["details"], []
+    # What a procedure looked at and did not use would look as if it counted.
+    unused = {p["name"] for p in data["procedures"] if not p["used"]}
+    details, drawn = {key: value for key, value in data["details"].items() if key not in unused}, []
     if details.get("sensor_calibration", {}).get("traces"):
         drawn.append((calibration, (details["sensor_calibration"],)))
     for key, draw in (("friction_lines", friction), ("line_inertia", inertia), ("frequency_response", response),

@@ -63,6 +63,13 @@ def draw(trend):
     plt = plotting.pyplot()
     figure, axes = plt.subplots(figsize=(11, 5.5), constrained_layout=True)
     scale, unit = (1e6, "um") if trend["unit"] == "m" else (1e3, "mrad")
+    if not trend["series"]["time"]:
+        axes.text(0.5, 0.5, "no estimate with a value in the history yet", transform=axes.transAxes, ha="center", fontsize=14)
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.set_title(trend["message"], fontsize=9, wrap=True)
+        figure.suptitle(os.path.basename(trend["history"]), fontsize=11)
+        return figure
     draw_points(axes, trend["series"], scale)
     end, reaches = trend["time"], trend["reaches"]
     if reaches and reaches["time"] is not None:

@@ -18,8 +18,7 @@
 namespace backlash::report {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
-constexpr double kMicrometre = 1e-6;
+constexpr double kMicrometre = 1e-6, kMilliradian = 1e-3;
 constexpr double kTold = 0.9;  // of what was known before, from which a record tells nothing: choice
 
 /// "80.0" and "[78.2, 81.9]"; an end that is not known is "?". Both empty where nothing is known.
@@ -31,13 +30,27 @@ Json cell(double value, double lower, double upper, double unit) {
            open ? "" : fmt::format("[{}, {}]", four_digits(lower / unit), four_digits(upper / unit))}};
 }
 
-/// Of one estimate or of all together: lengths, and angles, which a linear axis does not have.
+/// What all plays of a page are in: a length along the line of action (on a linear axis, of it), or an angle
+/// of the axis of motor_position where the rig gives no base radius.
+struct PageUnit {
+  bool linear = false, angle = false;
+
+  double scale() const { return angle ? kMilliradian : kMicrometre; }
+  const char* name() const { return angle ? "mrad" : "\u00b5m"; }
+};
+
+PageUnit unit_of(const diagnosis::Diagnosis& diagnosis, bool linear) {
+  const auto length = [](const auto& a) { return std::isfinite(a.backlash) || std::isfinite(a.upper); };
+  bool any = length(diagnosis.verdict);
+  for (const diagnosis::Estimate& e : diagnosis.estimates) any = any || length(e);
+  return {linear, !linear && !any};
+}
+
+/// Of one estimate or of all together.
 template <typename Answer>
-Json cells(const Answer& a, bool linear) {
-  if (linear) return Json::array({cell(a.backlash_angle, a.angle_lower, a.angle_upper, kMicrometre)});
-  return Json::array({cell(a.backlash, a.lower, a.upper, kMicrometre),
-                      cell(a.backlash_angle, a.angle_lower, a.angle_upper, 1),
-                      cell(a.backlash_angle, a.angle_lower, a.angle_upper, kDegree)});
+Json play(const Answer& a, const PageUnit& unit) {
+  return unit.linear || unit.angle ? cell(a.backlash_angle, a.angle_lower, a.angle_upper, unit.scale())
+                                   : cell(a.backlash, a.lower, a.upper, unit.scale());
 }
 
 std::string parts_text(const diagnosis::PlayComponents& parts) {
@@ -53,21 +66,25 @@ std::string parts_text(const diagnosis::PlayComponents& parts) {
 }
 
 /// "Good: 79.98 um of backlash, 95 % interval 77.93 to 82.17 um."; empty where that is not known.
-std::string headline(const diagnosis::Verdict& v, bool linear) {
-  const bool angle = linear || (!std::isfinite(v.backlash) && !std::isfinite(v.lower));
+std::string headline(const diagnosis::Verdict& v, const PageUnit& unit) {
+  const bool angle = unit.linear || unit.angle;
   const double value = angle ? v.backlash_angle : v.backlash;
   if (!std::isfinite(value)) return "";
   const double lower = angle ? v.angle_lower : v.lower, upper = angle ? v.angle_upper : v.upper;
-  const bool degrees = angle && !linear;
-  const double scale = degrees ? kDegree : kMicrometre;
   std::string grade = diagnosis::to_string(v.grade);
   grade[0] = char(std::toupper(grade[0]));
   return fmt::format("{}: {} {unit} of backlash, 95 % interval {} to {} {unit}.", grade,
-                     four_digits(value / scale), four_digits(lower / scale), four_digits(upper / scale),
-                     fmt::arg("unit", degrees ? "deg" : "\u00b5m"));
+                     four_digits(value / unit.scale()), four_digits(lower / unit.scale()),
+                     four_digits(upper / unit.scale()), fmt::arg("unit", unit.name()));
 }
 
-Json estimates(const diagnosis::Diagnosis& diagnosis, bool linear) {
+/// What a headline leaves to be said: by which methods, and what contradicts them.
+std::string beside_headline(const std::string& message) {
+  const std::size_t by = message.find(" by ");
+  return by == std::string::npos ? message : "B" + message.substr(by + 2);
+}
+
+Json estimates(const diagnosis::Diagnosis& diagnosis, const PageUnit& unit) {
   Json rows = Json::array();
   for (const diagnosis::Estimate& e : diagnosis.estimates) {
     std::string how = e.message;
@@ -76,7 +93,7 @@ Json estimates(const diagnosis::Diagnosis& diagnosis, bool linear) {
     rows.push_back({{"method", e.method},
                     {"status", diagnosis::to_string(e.status)},
                     {"together", false},
-                    {"cells", cells(e, linear)},
+                    {"play", play(e, unit)},
                     {"how", how},
                     {"parts", e.components ? parts_text(*e.components) : ""}});
   }
@@ -85,7 +102,7 @@ Json estimates(const diagnosis::Diagnosis& diagnosis, bool linear) {
     rows.push_back({{"method", "together"},
                     {"status", diagnosis::to_string(v.grade)},
                     {"together", true},
-                    {"cells", cells(v, linear)},
+                    {"play", play(v, unit)},
                     {"how", v.agreement},
                     {"parts", ""}});
   return rows;
@@ -160,14 +177,15 @@ std::string plots_of(const DiagnosisReport& report, const rig_file::RigFile* rig
 
 std::string diagnosis_page(const DiagnosisReport& report, const rig_file::RigFile* rig,
                            const Provenance& provenance) {
-  const bool linear = rig && rig->rig.linear;
+  const PageUnit unit = unit_of(report.diagnosis, rig && rig->rig.linear);
   const std::string of = report.rig.empty() ? report.record->name : report.rig + ", " + report.record->name;
   const diagnosis::Verdict& verdict = report.diagnosis.verdict;
+  const std::string first = headline(verdict, unit);
   const Json data = {{"grade", diagnosis::to_string(verdict.grade)},
-                     {"headline", headline(verdict, linear)},
-                     {"message", verdict.message},
-                     {"linear", linear},
-                     {"estimates", estimates(report.diagnosis, linear)},
+                     {"headline", first},
+                     {"message", first.empty() ? verdict.message : beside_headline(verdict.message)},
+                     {"unit", unit.name()},
+                     {"estimates", estimates(report.diagnosis, unit)},
                      {"plots", plots_of(report, rig)},
                      {"has_machine", rig != nullptr},
                      {"machine", machine(report, rig)},

@@ -61,6 +61,15 @@ class Listing {
     }
   }
 
+  /// What of a machine that no waveform is fitted to decides the units of its teeth.
+  static diagnosis::WaveformSettings contact_of(const model::Rig& rig) {
+    diagnosis::WaveformSettings s;
+    s.angular = rig.mesh.angular();
+    if (rig.mesh.rigid) return s;
+    if (const auto contact = rig.mesh.contact->power_contact()) s.contact_exponent = contact->exponent;
+    return s;
+  }
+
   static std::string scalar(const YamlNode& map, const char* key) {
     const auto entry = map.entries.find(key);
     return entry == map.entries.end() ? std::string() : entry->second.value->scalar;
@@ -88,7 +97,11 @@ class Listing {
 
   void fill_quantity(DeclaredValue& v, std::size_t q) {
     const diagnosis::WaveformQuantity& quantity = diagnosis::waveform_quantities()[q];
-    v.unit = file_.diagnosis.waveform ? quantity.unit_in(*file_.diagnosis.waveform) : quantity.unit;
+    const diagnosis::WaveformSettings contact = file_.diagnosis.waveform.value_or(contact_of(file_.rig));
+    v.unit = quantity.unit_in(contact);
+    if (const std::size_t power = v.unit.find("^n");
+        power != std::string::npos && contact.contact_exponent == 1)
+      v.unit.erase(power, 2);
     v.share = shared_inertia(known_places()[q], file_.rig);
     if (!v.uncertainty.empty() && v.uncertainty.back() != '%') v.uncertainty += " " + v.unit;
     if (!file_.diagnosis.waveform || !quantity.in(*file_.diagnosis.waveform)) return;

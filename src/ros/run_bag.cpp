@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/run_bag.h"
 
-#include <fmt/format.h>
-#include <rosbag/bag.h>
 #include <std_msgs/Float64.h>
 #include <std_msgs/String.h>
-#include <unistd.h>
 
-#include <filesystem>
-#include <memory>
-
-#include "backlash_diagnosis/base/error.h"
+#include "whole_bag.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -37,19 +31,7 @@ void write_all(rosbag::Bag& bag, const RunRecording& recording) {
 }  // namespace
 
 void write_run_bag(const RunRecording& recording, const std::string& path) {
-  const std::string beside = fmt::format("{}.tmp-{}", path, ::getpid());
-  auto bag = std::make_unique<rosbag::Bag>();
-  try {
-    bag->open(beside, rosbag::bagmode::Write);
-    write_all(*bag, recording);
-    bag->close();
-    std::filesystem::rename(beside, path);
-  } catch (const std::exception& e) {
-    (void)bag.release();  // its destructor would write again, and end the program where that fails too
-    std::error_code ignored;
-    std::filesystem::remove(beside, ignored);
-    throw CannotWrite(fmt::format("{}: cannot be written: {}", path, e.what()));
-  }
+  write_whole_bag(path, [&](rosbag::Bag& bag) { write_all(bag, recording); });
 }
 
 }  // namespace backlash::ros_bridge

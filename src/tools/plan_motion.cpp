@@ -9,10 +9,10 @@
 
 #include "backlash_diagnosis/arm_findings/motion_plan_report.h"
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/geared_arm/motion_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/held_joints.h"
 #include "tools/common/of_file.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
@@ -32,9 +32,7 @@ Command command() {
       {"out", "MOTION.yaml", "the motion: a Fourier series per joint, for simulate --motion", true},
       {"json", "OUT.json", "the same with all figures"},
       {"write-rig", "RIG.yaml", "of a URDF: the rig file that it is taken for, to complete and for identify"},
-      {"hold", "JOINT[=POSITION]...",
-       "of a URDF: joints that stand still, a gripper's for instance, and where [rad; m of a prismatic one]; "
-       "without a position at 0"},
+      hold_option(),
       {"csv", "TRAJECTORY.csv", "approach and one period as samples, for any controller; needs --rate"},
       {"rate", "HZ", "of --csv"},
       {"acceleration", "RAD/S^2", "limit of the joints whose motion_limits in the rig file have none"},
@@ -82,28 +80,10 @@ void check_outputs(const Arguments& arguments, const std::vector<std::string>& i
   if (arguments.has("csv") != arguments.has("rate")) throw UsageError("--csv and --rate go together");
 }
 
-/// JOINT or JOINT=POSITION; no joint's name holds a '='.
-arm::HeldJoints held_of(const Arguments& arguments) {
-  arm::HeldJoints held;
-  if (!arguments.has("hold")) return held;
-  for (const std::string& text : arguments.texts("hold")) {
-    const auto sign = text.find('=');
-    double position = 0;
-    if (sign != std::string::npos) {
-      const ParsedNumber number = parse_number(std::string_view(text).substr(sign + 1));
-      if (!number) throw UsageError("--hold '" + printable(text) + "': the position is " + number.problem);
-      position = number.value;
-    }
-    if (!held.emplace(text.substr(0, sign), position).second)
-      throw UsageError("--hold names '" + printable(text.substr(0, sign)) + "' twice");
-  }
-  return held;
-}
-
 geared_arm::GearedArm arm_of(const Arguments& arguments) {
   const std::string& path = arguments.positional(0);
   if (rig_file::is_urdf(path)) {
-    const arm::ArmRig rig = arm::arm_rig_of_urdf(path, held_of(arguments));
+    const arm::ArmRig rig = arm::arm_rig_of_urdf(path, held_joints(arguments));
     check_outputs(arguments, {path});
     if (arguments.has("write-rig")) write_text(arguments.text("write-rig"), rig.text);
     return geared_arm::geared_arm_from_text(rig.text, "the rig of " + path, "");

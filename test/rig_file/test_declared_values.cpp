@@ -63,5 +63,13 @@ TEST(DeclaredValues, OfOtherMachinesToo) {
   }
 }
 
+TEST(DeclaredValues, LinearTeethOfAnglesAreInNewtonMetresPerRadian) {
+  const auto all = declared_values(load_rig_file(test::package_file("config/two_inertia_servo.yaml")));
+  const auto found = std::find_if(all.begin(), all.end(),
+                                  [](const DeclaredValue& v) { return v.name == "mesh.contact.stiffness"; });
+  ASSERT_NE(found, all.end());
+  EXPECT_EQ(found->unit, "N m/rad");
+}
+
 }  // namespace
 }  // namespace backlash::rig_file

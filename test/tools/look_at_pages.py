@@ -51,7 +51,8 @@ def give_up(reason):
     sys.exit(77)
 
 
-def browser(profile):
+def browser(profile, reached=()):
+    """`reached`: hosts that the pages may load from; the outside is out of reach."""
     from selenium import webdriver
     from selenium.webdriver.chrome.options import Options
     from selenium.webdriver.chrome.service import Service
@@ -59,7 +60,7 @@ def browser(profile):
     options.binary_location = BROWSER
     for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars",
                      "--disable-background-networking", "--no-first-run", "--user-data-dir=" + profile,
-                     "--host-resolver-rules=MAP * ~NOTFOUND"):  # the outside is out of reach
+                     "--host-resolver-rules=" + ", ".join(["MAP * ~NOTFOUND"] + ["EXCLUDE " + host for host in reached])):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = webdriver.Chrome(service=Service(DRIVER), options=options)
