@@ -53,6 +53,10 @@ constexpr double kVague = 4;    // upper over lower end of an interval, by which
 constexpr double kRivalCost = 9;  // theory: three standard errors
 constexpr double kLaw =
     0.2;  // of the deflection of a flank: laws of teeth that are in no prior, 95 %: simulation
+// Theory: flanks that follow Hertz's law (the deflection is the torque to the power 2/3, torques alike often)
+// beside a gap, fitted by lines: the gap is 0.15 of the largest deflection too large on either side, what is
+// left 0.0327 of it rms.
+constexpr double kLawOfLeft = 0.30 / 0.0327;
 // Of the play: what moves it beside the declared, by the motor alone and with the load's encoder, whose error
 // follows the place; 95 %: simulation.
 constexpr double kModel = 0.15, kModelByLoad = 0.04;
@@ -313,17 +317,20 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
     throw Refusal{Status::out_of_domain,
                   fmt::format("no machine like that of the rig file explains the {}: {:.0f} % of it are left",
                               data.load.empty() ? "torque" : "motor's position less the load's", 100 * left)};
+  // Of a commissioned machine, rad by which lines for its flanks may move the gap.
+  const double tried = std::isnan(s.unexplained) ? HUGE_VAL : kLawOfLeft * s.unexplained;
+  const double model = data.load.empty() ? kModel : std::min(kModelByLoad, tried / gap);
   double lower = gap, upper = gap;
   for (const TraverseFit& fit : fits) {
-    const double half = std::hypot(signal::student_t_quantile(0.975, windows - 1) * Errors(fit).larger(),
-                                   data.load.empty() ? kModel : kModelByLoad, left);
+    const double half =
+        std::hypot(signal::student_t_quantile(0.975, windows - 1) * Errors(fit).larger(), model, left);
     if (!(std::exp(2 * half) < kVague))
       throw Refusal{
           Status::insufficient_data,
           fmt::format("{} windows of the record show the play only from {:.2g} to {:.2g} rad: moves that "
                       "reverse, and press both flanks, would do",
                       windows, fit.gap() * std::exp(-half), fit.gap() * std::exp(half))};
-    const double law = kLaw * deflection(fit, data);
+    const double law = std::min(tried, kLaw * deflection(fit, data));
     lower = std::min(lower, fit.gap() - std::hypot(fit.gap() * (1 - std::exp(-half)), law));
     upper = std::max(upper, fit.gap() + std::hypot(fit.gap() * (std::exp(half) - 1), law));
   }
