@@ -33,7 +33,7 @@ double unexplained_deflection(const Identification& found) {
   for (const ChannelTrace& trace : found.deflection) {
     std::vector<double> counted;
     for (std::size_t i = 0; i < trace.measured.size(); ++i)
-      if (trace.counts[i]) counted.push_back(trace.measured[i]);
+      if (trace.counts.empty() || trace.counts[i]) counted.push_back(trace.measured[i]);
     const double mean = std::accumulate(counted.begin(), counted.end(), 0.0) / double(counted.size());
     for (const double value : counted) squares += (value - mean) * (value - mean), ++count;
   }

@@ -6,6 +6,8 @@ import csv
 import json
 import os
 import shutil
+import subprocess
+import tempfile
 import time
 import unittest
 
@@ -38,13 +40,19 @@ def wait(condition, what):
 class RunningEstimatesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.history = rospy.get_param("/history_of_test")
+        cls.history = tempfile.mkdtemp()
+        cls.log = tempfile.TemporaryFile(mode="w+")
+        cls.launch = subprocess.Popen(["roslaunch", "backlash_diagnosis", "simulated_robot.launch", "real_time_factor:=10",
+                                       "history:=" + cls.history], stdout=cls.log, stderr=subprocess.STDOUT)
         cls.states = Inbox("/joint_states", JointState)
         cls.estimates = Inbox("/backlash_estimate", BacklashEstimate)
         cls.diagnostics = Diagnostics()
 
     @classmethod
     def tearDownClass(cls):
+        cls.launch.send_signal(2)
+        cls.launch.wait(TIMEOUT)
+        cls.log.close()
         shutil.rmtree(cls.history, ignore_errors=True)
 
     def answers(self, joint, later_than=0):
