@@ -12,6 +12,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/base/yaml_problems.h"
 #include "backlash_diagnosis/base/yaml_tree.h"
 
 namespace backlash {
@@ -97,6 +98,12 @@ std::string Range::text() const {
   return "must be " + from + " and " + to;
 }
 
+/// What is handed out where a number is missing or wrong, and all mistakes are collected.
+double some_number(const Range& range) {
+  const double from = range.lower > -kInfinity ? range.lower : std::min(0.0, range.upper);
+  return range.upper < kInfinity ? (from + range.upper) / 2 : from + 1;
+}
+
 /// "30 %" or a number in the unit of the value.
 std::string uncertainty_problem(const YamlNode& node, Uncertainty& u) {
   const char* const kExpected = "a number > 0, or one with % behind it";
@@ -118,12 +125,20 @@ struct YamlReader::Impl {
   std::string path;  // "gear_train.motor", empty at the top
   int line = 0;
   std::set<std::string> asked;
+  bool absent = false;  // it stands for one that is missing or no map: nobody complains of what it lacks
   bool unused_uncertainty = false;  // it is a number with one that nobody asked for
   std::map<std::pair<std::string, std::size_t>, std::shared_ptr<Impl>>
       children;  // by key and index in a list
 
   [[noreturn]] void fail_at(int where, const std::string& what) const {
     throw BadData(tree->name + ":" + std::to_string(where), what);
+  }
+
+  // Throws, unless all mistakes are collected.
+  void complain(int where, const std::string& what) const {
+    YamlProblems* const all = YamlProblems::current();
+    if (all == nullptr) fail_at(where, what);
+    if (!absent) all->note(tree->name + ":" + std::to_string(where) + ": " + what);
   }
 
   std::string full(const std::string& key) const {
@@ -137,25 +152,47 @@ struct YamlReader::Impl {
     return entry == node->entries.end() ? nullptr : &entry->second;
   }
 
-  const YamlEntry& get(const std::string& key, const std::string& expected) {
+  // nullptr where it is missing, and all mistakes are collected.
+  const YamlEntry* get(const std::string& key, const std::string& expected) {
     const YamlEntry* const entry = find(key);
-    if (entry == nullptr) fail_at(line, full(key) + ": is missing, expected " + expected);
-    return *entry;
+    if (entry == nullptr) complain(line, full(key) + ": is missing, expected " + expected);
+    return entry;
   }
 
-  void require(const YamlEntry& entry, const std::string& key, const std::string& problem) const {
-    if (!problem.empty()) fail_at(entry.line, full(key) + " = " + shown(*entry.value) + ": " + problem);
+  // Whether there is no problem.
+  bool require(const YamlEntry& entry, const std::string& key, const std::string& problem) const {
+    if (!problem.empty()) complain(entry.line, full(key) + " = " + shown(*entry.value) + ": " + problem);
+    return problem.empty();
   }
 
-  const YamlNode& get_list(const std::string& key, const std::string& expected) {
-    const YamlEntry& entry = get(key, expected);
-    require(entry, key, entry.value->kind == Kind::list ? "" : "must be " + expected);
-    return *entry.value;
+  // nullptr as get().
+  const YamlNode* get_list(const std::string& key, const std::string& expected) {
+    const YamlEntry* const entry = get(key, expected);
+    if (!entry || !require(*entry, key, entry->value->kind == Kind::list ? "" : "must be " + expected))
+      return nullptr;
+    return entry->value;
   }
 
-  void require_item(const std::string& key, std::size_t index, const YamlNode& item,
+  bool require_item(const std::string& key, std::size_t index, const YamlNode& item,
                     const std::string& problem) const {
-    if (!problem.empty()) fail_at(item.line, item_path(key, index) + " = " + shown(item) + ": " + problem);
+    if (!problem.empty()) complain(item.line, item_path(key, index) + " = " + shown(item) + ": " + problem);
+    return problem.empty();
+  }
+
+  // A map without anything, instead of one that is missing.
+  std::shared_ptr<Impl> no_map(const std::string& key) const {
+    static const YamlNode kEmpty = [] {
+      YamlNode node;
+      node.kind = Kind::map;
+      return node;
+    }();
+    auto none = std::make_shared<Impl>();
+    none->tree = tree;
+    none->node = &kEmpty;
+    none->path = full(key);
+    none->line = line;
+    none->absent = true;
+    return none;
   }
 
   std::string item_path(const std::string& key, std::size_t index) const {
@@ -176,7 +213,7 @@ struct YamlReader::Impl {
   }
 
   std::shared_ptr<Impl> map_child(const std::string& key, const YamlEntry& entry) {
-    require(entry, key, entry.value->kind == Kind::map ? "" : "must be a map");
+    if (!require(entry, key, entry.value->kind == Kind::map ? "" : "must be a map")) return no_map(key);
     return child(key, 0, *entry.value, full(key), entry.line);
   }
 
@@ -186,19 +223,23 @@ struct YamlReader::Impl {
     return map_child(key, entry);
   }
 
+  void complain_of(const std::pair<const std::string, YamlEntry>& unknown) const {
+    complain(unknown.second.line,
+             full(unknown.first) + " = " + shown(*unknown.second.value) +
+                 ": unknown key, known here: " + (asked.empty() ? "none" : joined(asked)));
+  }
+
   void finish() const {
     if (unused_uncertainty)
-      fail_at(line, path + ": nothing uses the uncertainty of this value, give a number");
+      complain(line, path + ": nothing uses the uncertainty of this value, give a number");
     const std::pair<const std::string, YamlEntry>* unknown = nullptr;  // the first in the file
     for (const auto& entry : node->entries) {
       if (asked.count(entry.first) != 0) continue;
       if (unknown == nullptr || entry.second.line < unknown->second.line) unknown = &entry;
     }
-    if (unknown != nullptr) {
-      fail_at(unknown->second.line,
-              full(unknown->first) + " = " + shown(*unknown->second.value) +
-                  ": unknown key, known here: " + (asked.empty() ? "none" : joined(asked)));
-    }
+    if (unknown != nullptr && YamlProblems::current() == nullptr) complain_of(*unknown);
+    for (const auto& entry : node->entries)
+      if (asked.count(entry.first) == 0) complain_of(entry);
     for (const auto& [place, reader] : children) reader->finish();
   }
 };
@@ -239,19 +280,20 @@ bool YamlReader::is_text(const std::string& key) const {
 }
 
 double YamlReader::number(const std::string& key, const Range& range) const {
-  const YamlEntry& entry = impl_->get(key, "a number");
-  if (const auto known = impl_->known_number(key, entry)) {
+  const YamlEntry* const entry = impl_->get(key, "a number");
+  if (!entry) return some_number(range);
+  if (const auto known = impl_->known_number(key, *entry)) {
     const YamlReader reader(known);
     if (known->asked.empty()) known->unused_uncertainty = true;
     Uncertainty u;
-    const YamlEntry& said = known->get("uncertainty", "one standard deviation");
-    known->require(said, "uncertainty", uncertainty_problem(*said.value, u));
+    const YamlEntry* const said = known->get("uncertainty", "one standard deviation");
+    if (said) known->require(*said, "uncertainty", uncertainty_problem(*said->value, u));
     reader.text_or("source", "");
     return reader.number("value", range);
   }
   double value = 0;
-  impl_->require(entry, key, number_problem(*entry.value, range, value));
-  return value;
+  return impl_->require(*entry, key, number_problem(*entry->value, range, value)) ? value
+                                                                                  : some_number(range);
 }
 
 std::optional<Uncertainty> YamlReader::uncertainty(const std::string& key) const {
@@ -259,9 +301,10 @@ std::optional<Uncertainty> YamlReader::uncertainty(const std::string& key) const
   const auto known = entry == nullptr ? nullptr : impl_->known_number(key, *entry);
   if (!known) return std::nullopt;
   Uncertainty u;
-  const YamlEntry& said = known->get("uncertainty", "one standard deviation");
-  known->require(said, "uncertainty", uncertainty_problem(*said.value, u));
   known->unused_uncertainty = false;
+  const YamlEntry* const said = known->get("uncertainty", "one standard deviation");
+  if (!said || !known->require(*said, "uncertainty", uncertainty_problem(*said->value, u)))
+    return std::nullopt;
   return u;
 }
 
@@ -271,9 +314,10 @@ bool YamlReader::is_map(const std::string& key) const {
 }
 
 long YamlReader::integer(const std::string& key, long lower, long upper) const {
-  const YamlEntry& entry = impl_->get(key, "an integer");
-  impl_->require(entry, key, scalar_problem(*entry.value, "an integer"));
-  const std::string& text = entry.value->scalar;
+  const long some = std::clamp(1L, lower, upper);
+  const YamlEntry* const entry = impl_->get(key, "an integer");
+  if (!entry || !impl_->require(*entry, key, scalar_problem(*entry->value, "an integer"))) return some;
+  const std::string& text = entry->value->scalar;
   const char* const end = text.data() + text.size();
   const bool plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
   long value = 0;
@@ -283,47 +327,51 @@ long YamlReader::integer(const std::string& key, long lower, long upper) const {
   std::string limit = is_integer ? "must be " : "must be an integer ";
   limit += ">= " + std::to_string(lower);
   if (upper < std::numeric_limits<long>::max()) limit += " and <= " + std::to_string(upper);
-  impl_->require(entry, key, limit);
-  return value;
+  impl_->require(*entry, key, limit);
+  return some;
 }
 
 bool YamlReader::boolean(const std::string& key) const {
-  const YamlEntry& entry = impl_->get(key, "true or false");
-  impl_->require(entry, key, scalar_problem(*entry.value, "true or false"));
-  const bool value = entry.value->scalar == "true";
-  impl_->require(entry, key, value || entry.value->scalar == "false" ? "" : "must be true or false");
+  const YamlEntry* const entry = impl_->get(key, "true or false");
+  if (!entry || !impl_->require(*entry, key, scalar_problem(*entry->value, "true or false"))) return false;
+  const bool value = entry->value->scalar == "true";
+  impl_->require(*entry, key, value || entry->value->scalar == "false" ? "" : "must be true or false");
   return value;
 }
 
 std::string YamlReader::text(const std::string& key) const {
-  const YamlEntry& entry = impl_->get(key, "text");
-  impl_->require(entry, key, text_problem(*entry.value));
-  return entry.value->scalar;
+  const YamlEntry* const entry = impl_->get(key, "text");
+  if (!entry || !impl_->require(*entry, key, text_problem(*entry->value))) return "";
+  return entry->value->scalar;
 }
 
 std::string YamlReader::choice(const std::string& key, const std::vector<std::string>& allowed) const {
-  const YamlEntry& entry = impl_->get(key, "one of " + joined(allowed));
-  const bool known = text_problem(*entry.value).empty() &&
-                     std::find(allowed.begin(), allowed.end(), entry.value->scalar) != allowed.end();
-  impl_->require(entry, key, known ? "" : "must be one of " + joined(allowed));
-  return entry.value->scalar;
+  const YamlEntry* const entry = impl_->get(key, "one of " + joined(allowed));
+  if (!entry) return allowed.front();
+  const bool known = text_problem(*entry->value).empty() &&
+                     std::find(allowed.begin(), allowed.end(), entry->value->scalar) != allowed.end();
+  return impl_->require(*entry, key, known ? "" : "must be one of " + joined(allowed)) ? entry->value->scalar
+                                                                                       : allowed.front();
 }
 
 std::vector<double> YamlReader::numbers(const std::string& key, const Range& range) const {
-  const YamlNode& list = impl_->get_list(key, "a list of numbers");
-  std::vector<double> values(list.items.size());
+  const YamlNode* const list = impl_->get_list(key, "a list of numbers");
+  if (!list) return {};
+  std::vector<double> values(list->items.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
-    impl_->require_item(key, i, *list.items[i], number_problem(*list.items[i], range, values[i]));
+    const YamlNode& item = *list->items[i];
+    if (!impl_->require_item(key, i, item, number_problem(item, range, values[i])))
+      values[i] = some_number(range);
   }
   return values;
 }
 
 std::vector<std::string> YamlReader::texts(const std::string& key) const {
-  const YamlNode& list = impl_->get_list(key, "a list of texts");
+  const YamlNode* const list = impl_->get_list(key, "a list of texts");
   std::vector<std::string> values;
-  for (std::size_t i = 0; i < list.items.size(); ++i) {
-    impl_->require_item(key, i, *list.items[i], text_problem(*list.items[i]));
-    values.push_back(list.items[i]->scalar);
+  for (std::size_t i = 0; list && i < list->items.size(); ++i) {
+    impl_->require_item(key, i, *list->items[i], text_problem(*list->items[i]));
+    values.push_back(list->items[i]->scalar);
   }
   return values;
 }
@@ -345,7 +393,8 @@ std::string YamlReader::text_or(const std::string& key, const std::string& absen
 }
 
 YamlReader YamlReader::map(const std::string& key) const {
-  return YamlReader(impl_->map_child(key, impl_->get(key, "a map")));
+  const YamlEntry* const entry = impl_->get(key, "a map");
+  return YamlReader(entry ? impl_->map_child(key, *entry) : impl_->no_map(key));
 }
 
 std::optional<YamlReader> YamlReader::optional_map(const std::string& key) const {
@@ -354,11 +403,11 @@ std::optional<YamlReader> YamlReader::optional_map(const std::string& key) const
 }
 
 std::vector<YamlReader> YamlReader::maps(const std::string& key) const {
-  const YamlNode& list = impl_->get_list(key, "a list of maps");
+  const YamlNode* const list = impl_->get_list(key, "a list of maps");
   std::vector<YamlReader> readers;
-  for (std::size_t i = 0; i < list.items.size(); ++i) {
-    const YamlNode& item = *list.items[i];
-    impl_->require_item(key, i, item, item.kind == Kind::map ? "" : "must be a map");
+  for (std::size_t i = 0; list && i < list->items.size(); ++i) {
+    const YamlNode& item = *list->items[i];
+    if (!impl_->require_item(key, i, item, item.kind == Kind::map ? "" : "must be a map")) continue;
     readers.push_back(YamlReader(impl_->child(key, i, item, impl_->item_path(key, i), item.line)));
   }
   return readers;

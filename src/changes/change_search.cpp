@@ -258,9 +258,11 @@ void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
   f.gain = f.score.gain / f.inflation;
 }
 
-/// The record as a whole has another value of the effect: a nuisance from then on.
+/// The record as a whole has another value of the effect: a nuisance from then on, and a difference where no
+/// healthy record has it, too.
 void ChangeSearch::differ(FoundChange f) {
-  different_.push_back(f.effect.name());
+  if (!scores_.is_healthy(f.effect, f.score, f.inflation, threshold(f.score.values.size())))
+    different_.push_back(f.effect.name());
   f.from = 0;
   f.to = blocks_ + 1;
   const Background with = background({f});

@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "healthy_scores.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 
 namespace backlash::changes {
+namespace {
+
+constexpr double kAlike =
+    0.25;  // - of a value, by which a difference is none: choice, that of different_values.cpp
+
+}  // namespace
 
 HealthyScores::HealthyScores(const HealthyModel& model, const ChangeSettings& settings)
     : records_(model.records),
@@ -36,6 +43,23 @@ double HealthyScores::most_growth(const ChangeEffect& effect) const {
       most = std::max(most, sums.score(k, sums.blocks(), backgrounds_[r]).gain);
   }
   return most;
+}
+
+bool HealthyScores::is_healthy(const ChangeEffect& effect, const EffectSums::Score& found, double inflation,
+                               double threshold) const {
+  bool shown = false;
+  for (std::size_t r = 0; r < records_->size(); ++r) {
+    const SampledMotion& motion = (*records_)[r];
+    const EffectSums sums(motion, *effect_columns(motion, effect), backgrounds_[r], block_, effect.ramp);
+    const EffectSums::Score own = sums.score(0, sums.blocks(), backgrounds_[r]);
+    if (own.values.size() != found.values.size()) continue;
+    shown = true;
+    const Eigen::VectorXd by = found.values - own.values;
+    const Eigen::MatrixXd covariance = found.covariance + own.covariance;
+    if (by.norm() < kAlike * found.values.norm()) return true;
+    if (by.dot(covariance.ldlt().solve(by)) < inflation * threshold) return true;
+  }
+  return !shown;
 }
 
 }  // namespace backlash::changes

@@ -51,8 +51,9 @@ constexpr double kLeft = 0.35;  // of the deflection or the torque, that is not 
 constexpr double kVague = 4;    // upper over lower end of an interval, by which it says too little
 // The interval.
 constexpr double kRivalCost = 9;  // theory: three standard errors
-constexpr double kLaw =
-    0.2;  // of the deflection of a flank: laws of teeth that are in no prior, 95 %: simulation
+constexpr double kLaw = 0.2;      // of a flank's deflection, 95 %: laws of teeth in no prior: simulation
+// Theory: Hertz's flanks fitted by lines move the gap by 0.30 of the deflection, and leave 0.0327 rms.
+constexpr double kLawOfLeft = 0.30 / 0.0327;
 // Of the play: what moves it beside the declared, by the motor alone and with the load's encoder, whose error
 // follows the place; 95 %: simulation.
 constexpr double kModel = 0.15, kModelByLoad = 0.04;
@@ -313,22 +314,23 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
     throw Refusal{Status::out_of_domain,
                   fmt::format("no machine like that of the rig file explains the {}: {:.0f} % of it are left",
                               data.load.empty() ? "torque" : "motor's position less the load's", 100 * left)};
+  const double tried = std::isnan(s.unexplained) ? HUGE_VAL : kLawOfLeft * s.unexplained;  // rad
+  const double model = data.load.empty() ? kModel : std::min(kModelByLoad, tried / gap);
   double lower = gap, upper = gap;
   for (const TraverseFit& fit : fits) {
-    const double half = std::hypot(signal::student_t_quantile(0.975, windows - 1) * Errors(fit).larger(),
-                                   data.load.empty() ? kModel : kModelByLoad, left);
+    const double half =
+        std::hypot(signal::student_t_quantile(0.975, windows - 1) * Errors(fit).larger(), model, left);
     if (!(std::exp(2 * half) < kVague))
       throw Refusal{
           Status::insufficient_data,
           fmt::format("{} windows of the record show the play only from {:.2g} to {:.2g} rad: moves that "
                       "reverse, and press both flanks, would do",
                       windows, fit.gap() * std::exp(-half), fit.gap() * std::exp(half))};
-    const double law = kLaw * deflection(fit, data);
+    const double law = std::min(tried, kLaw * deflection(fit, data));
     lower = std::min(lower, fit.gap() - std::hypot(fit.gap() * (1 - std::exp(-half)), law));
     upper = std::max(upper, fit.gap() + std::hypot(fit.gap() * (std::exp(half) - 1), law));
   }
-  // Without a gap teeth are a spring, of which nobody sees the torque at rest: one flank may be pressed
-  // throughout as well.
+  // Without a gap teeth are a spring: one flank may be pressed throughout as well.
   if (!(lower > 0))
     throw Refusal{
         Status::below_range,

@@ -15,6 +15,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/diagnose.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "history_line.h"
 #include "history_parts.h"
 
@@ -22,6 +23,8 @@ namespace backlash::diagnosis {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kLeastSilence = 600, kSilentSteps = 3;  // s, -: choices, see silent_since()
 
 [[noreturn]] void fail(const std::string& path, const std::string& reason) {
   throw CannotWrite(path + ": cannot be written: " + reason);
@@ -63,6 +66,18 @@ bool ends_within_line(int descriptor, std::uintmax_t size, const std::string& pa
 }
 
 }  // namespace
+
+std::optional<double> silent_since(const std::vector<HistoryEntry>& entries, double end) {
+  if (entries.empty()) return std::nullopt;
+  std::vector<double> times, steps;
+  times.reserve(entries.size());
+  for (const HistoryEntry& entry : entries) times.push_back(entry.time);
+  std::sort(times.begin(), times.end());
+  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+  const double usual = steps.empty() ? 0 : signal::median(steps);
+  if (end - times.back() <= std::max(kLeastSilence, kSilentSteps * usual)) return std::nullopt;
+  return times.back();
+}
 
 HistoryEntry history_entry(double time, const Diagnosis& diagnosis, const std::string& rig_digest) {
   const Verdict& verdict = diagnosis.verdict;

@@ -206,8 +206,8 @@ double ArmPlant::backlash(std::size_t joint) const {
 }
 
 void ArmPlant::set_backlash(std::size_t joint, double backlash) {
-  if (!std::isfinite(backlash) || backlash < 0)
-    throw InvalidParameter("backlash", backlash, "must be finite and >= 0");
+  if (!(backlash >= 0) || !(backlash < 2 * M_PI))
+    throw InvalidParameter("backlash", backlash, "must be >= 0 and less than a whole turn, 6.283 rad");
   if (drives_[joint].motor < 0)
     throw InvalidParameter(
         "backlash", backlash,

@@ -2,7 +2,9 @@
 #include "backlash_diagnosis/identification/fitted_rig.h"
 
 #include <cmath>
+#include <numeric>
 
+#include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
 #include "backlash_diagnosis/model/term_text.h"
@@ -32,6 +34,30 @@ void replace_weight(rig_file::RigDocument& document, const Identification& found
                              {model::term_text(*term)});
 }
 
+/// rad, rms: of motor minus load position what the machine leaves beyond noise; NaN where that cannot be
+/// said.
+double unexplained_deflection(const Identification& found) {
+  const auto error = found.channels.find("deflection");
+  if (error == found.channels.end() || found.unexplained || found.several || found.deflection.empty())
+    return kNaN;
+  double squares = 0, count = 0;
+  for (const ChannelTrace& trace : found.deflection) {
+    std::vector<double> counted;
+    for (std::size_t i = 0; i < trace.measured.size(); ++i)
+      if (trace.counts.empty() || trace.counts[i]) counted.push_back(trace.measured[i]);
+    const double mean = std::accumulate(counted.begin(), counted.end(), 0.0) / double(counted.size());
+    for (const double value : counted) squares += (value - mean) * (value - mean), ++count;
+  }
+  const double train = error->second.error, floor = error->second.floor;
+  return std::sqrt(std::fabs(train * train - floor * floor) * squares / count);
+}
+
+std::vector<std::string> records_of(const Identification& found) {
+  std::vector<std::string> names;
+  for (const ChannelTrace& trace : found.deflection) names.push_back(trace.record);
+  return names;
+}
+
 }  // namespace
 
 std::string fitted_rig_text(const rig_file::RigFile& declared, const Identification& found) {
@@ -48,6 +74,9 @@ std::string fitted_rig_text(const rig_file::RigFile& declared, const Identificat
   }
   if (found.gap_map && gap_varies(declared.rig) && !found.unexplained)
     replace_gap_terms(document, *found.gap_map, found.rig.mesh.backlash / found.rig.mesh.lever());
+  if (const double left = unexplained_deflection(found);
+      std::isfinite(left) && declared.diagnosis.gap_traverse)
+    rig_file::set_unexplained_deflection(document, left, "identified from " + joined(records_of(found)));
   document.read();  // what is written can be read
   return document.text();
 }

@@ -68,7 +68,7 @@ Mesh read_mesh(const YamlReader& yaml) {
   if (mesh.angular() && key != "backlash_angle")
     yaml.fail(key, "a mesh without base_radius must state backlash_angle (rad)");
   const double factor = key == "half_gap" ? 2 : key == "backlash_angle" ? mesh.lever() : 1;
-  mesh.backlash = factor * yaml.number(key, Range::not_negative());
+  mesh.backlash = factor * yaml.number(key, Range::between(0, mesh.most_backlash() / factor));
   mesh.start_in_gap = yaml.number_or("start_in_gap", 0, Range::between(-1, 1));
   const ContactSpec contact = read_contact_spec(yaml.map("contact"));
   mesh.contact = make_contact_law(contact.law, contact.values);

@@ -114,12 +114,25 @@ std::string told_text(const JointDay& joint, const Told& told) {
   return text;
 }
 
-Json joint_json(const JointDay& joint) {
+/// Why a joint has no entry at the end of the day, as far as the files show.
+std::string silence_text(const JointDay& joint, const Day& day) {
+  if (!joint.silent_since) return "";
+  const bool all = std::all_of(day.joints.begin(), day.joints.end(),
+                               [](const JointDay& other) { return other.silent_since.has_value(); });
+  return fmt::format("nothing since {} ({:.1f} h): {}", utc_time(*joint.silent_since),
+                     ((std::isnan(day.now) ? day.to : day.now) - *joint.silent_since) / 3600,
+                     all ? "no diagnoser wrote, it had ended or got no sample"
+                         : "no sample of this joint, while others had theirs");
+}
+
+Json joint_json(const JointDay& joint, const Day& day) {
   const Told told = told_of(joint);
   Json json = {{"joint", joint.joint},
                {"grade", joint.estimates.empty() ? "" : joint.estimates.back().grade},
                {"estimates", joint.estimates.size()},
                {"told", told.count},
+               {"silent_since", joint.silent_since ? Json(*joint.silent_since) : Json(nullptr)},
+               {"silence", silence_text(joint, day)},
                {"series", Json::array()},
                {"changes", Json::array()}};
   for (const diagnosis::HistoryEntry& e : joint.estimates)
@@ -140,13 +153,14 @@ Json joint_json(const JointDay& joint) {
   return json;
 }
 
-Json row_of(const JointDay& joint) {
+Json row_of(const JointDay& joint, const Day& day) {
   const Told told = told_of(joint);
   Json row = {{"joint", joint.joint},
               {"grade", joint.estimates.empty() ? "" : joint.estimates.back().grade},
               {"first", play_text(told.first)},
               {"last", play_text(told.last)},
               {"told", told_text(joint, told)},
+              {"silence", silence_text(joint, day)},
               {"changes", Json::array()}};
   for (const diagnosis::KnownChange& c : joint.changes)
     row["changes"].push_back(change_text(c.found) + (c.state == diagnosis::ChangeState::ended ? ", over"
@@ -173,28 +187,41 @@ bool tells(const diagnosis::HistoryEntry& e) {
          std::isfinite(e.angle_upper);
 }
 
-Day read_day(const std::string& folder, double to, double hours) {
+bool silent(const Day& day) {
+  return !std::isnan(day.now) && std::all_of(day.joints.begin(), day.joints.end(), [](const JointDay& joint) {
+    return joint.silent_since.has_value();
+  });
+}
+
+Day read_day(const std::string& folder, double to, double hours, double now) {
   Day day;
   const std::map<std::string, JointDay> all = read_files(folder, day.warnings);
   day.to = std::isnan(to) ? last_time(all) : to;
   if (!std::isfinite(day.to)) throw BadData(folder, "its files hold no estimate and no change");
   day.from = day.to - 3600 * hours;
-  for (const auto& [name, joint] : all) day.joints.push_back(within(joint, day.from, day.to));
+  if (std::isnan(to) && now > day.to) day.now = now;
+  for (const auto& [name, joint] : all) {
+    day.joints.push_back(within(joint, day.from, day.to));
+    day.joints.back().silent_since =
+        diagnosis::silent_since(day.joints.back().estimates, std::isnan(day.now) ? day.to : day.now);
+  }
   return day;
 }
 
 std::string day_summary(const Day& day) {
   std::vector<std::string> changes;
-  std::size_t silent = 0;
+  std::size_t mute = 0;
   for (const JointDay& joint : day.joints) {
-    silent += told_of(joint).count == 0;
+    mute += told_of(joint).count == 0;
     for (const diagnosis::KnownChange& c : joint.changes)
       changes.push_back(joint.joint + ": " + change_text(c.found));
   }
   std::string text = fmt::format("{} to {}: {} {}, ", utc_time(day.from), utc_time(day.to), day.joints.size(),
                                  day.joints.size() == 1 ? "joint" : "joints");
   text += changes.empty() ? "no change was told" : "changed: " + joined(changes);
-  if (silent > 0) text += fmt::format("; of {} no estimate told the play", silent);
+  if (mute > 0) text += fmt::format("; of {} no estimate told the play", mute);
+  for (const JointDay& joint : day.joints)
+    if (joint.silent_since) text += "; " + joint.joint + ": " + silence_text(joint, day);
   return text;
 }
 
@@ -202,7 +229,7 @@ std::string day_json(const Day& day) {
   Json json = {
       {"schema_version", 1},         {"version", version()},    {"from", day.from},        {"to", day.to},
       {"summary", day_summary(day)}, {"joints", Json::array()}, {"warnings", day.warnings}};
-  for (const JointDay& joint : day.joints) json["joints"].push_back(joint_json(joint));
+  for (const JointDay& joint : day.joints) json["joints"].push_back(joint_json(joint, day));
   return dumped(json, 1);
 }
 
@@ -212,7 +239,7 @@ std::string day_page(const Day& day, const Provenance& provenance) {
                {"plots", plots_of(day)},
                {"warnings", warnings_section(day.warnings)},
                {"provenance", provenance_sections(provenance)}};
-  for (const JointDay& joint : day.joints) data["joints"].push_back(row_of(joint));
+  for (const JointDay& joint : day.joints) data["joints"].push_back(row_of(joint, day));
   return report_page("A day of the joints, " + utc_date(day.to), filled(kDayTemplate, data));
 }
 

@@ -15,6 +15,7 @@
 namespace backlash::rig_file {
 namespace {
 
+constexpr const char* kUnexplained = "unexplained_deflection";
 constexpr const char* kGapKeys[] = {"backlash", "half_gap", "backlash_angle"};
 
 /// The map that holds the last key of the path; nothing where the file has none.
@@ -116,12 +117,22 @@ void read_known_values(const YamlReader& yaml, RigFile& file) {
       if (const auto u = mesh->uncertainty(key))
         file.backlash_error = spread_of(*mesh, key, *u, mesh->number(key, Range::not_negative()), true);
   const auto commissioned = yaml.optional_map("commissioned");
+  if (commissioned && commissioned->has(kUnexplained)) {
+    if (!file.diagnosis.gap_traverse) commissioned->fail(kUnexplained, "no estimator of this rig uses it");
+    file.diagnosis.gap_traverse->unexplained = commissioned->number(kUnexplained, Range::not_negative());
+  }
   if (!commissioned || !commissioned->has("common_scale")) return;
   commissioned->number("common_scale", Range::between(1, 1));
   const auto scale = commissioned->uncertainty("common_scale");
   if (!scale || !file.diagnosis.waveform)
     commissioned->fail("common_scale", "needs an uncertainty, and a rig whose waveform is fitted");
   file.diagnosis.waveform->common_scale = scale->size;
+}
+
+void set_unexplained_deflection(RigDocument& document, double rms, const std::string& source) {
+  document.set_section("commissioned",
+                       fmt::format("  {}: {:.3g}   # rad, rms, beyond noise\n", kUnexplained, rms),
+                       "what the fitted machine left of motor less load position: " + source);
 }
 
 std::string commissioned_text(const RigFile& file, const diagnosis::WaveformCommissioning& found,

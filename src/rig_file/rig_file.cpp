@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/digest.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/yaml_problems.h"
 #include "backlash_diagnosis/base/yaml_tree.h"
 #include "backlash_diagnosis/record/channels.h"
 #include "backlash_diagnosis/rig_file/declared_uncertainty.h"
@@ -215,19 +216,30 @@ model::Rig with_machine(model::Rig rig, const diagnosis::WaveformSettings& machi
 
 RigFile rig_file_from_text(const std::string& text, const std::string& source) {
   const YamlReader yaml = YamlReader::from_text(text, source);
+  YamlProblems problems;  // all mistakes of the file at once
   RigFile file;
   file.source = source;
   file.text = text;
   file.digest = digest_of(text);
   yaml.integer("schema_version", 1, 1);
-  file.rig = model::read_rig(yaml);
-  file.channels = record::read_channels(yaml, file.rig.joint, file.rig.linear);
-  file.simulation = simulation::read_simulation_settings(yaml);
-  check_excitation(yaml.map("excitation"), file.simulation.excitation, file.rig);
-  file.test_runs = read_test_runs(yaml, file.rig);
-  file.diagnosis = diagnosis::read_diagnosis_settings(yaml.map("diagnosis"));
-  if (const auto drive = yaml.optional_map("drive"))
-    file.drive = read_drive(*drive, file.rig.reduction_ratio);
+  problems.reading([&] { file.rig = model::read_rig(yaml); });
+  problems.reading([&] { file.channels = record::read_channels(yaml, file.rig.joint, file.rig.linear); });
+  problems.reading([&] {
+    file.simulation = simulation::read_simulation_settings(yaml);
+    if (yaml.has("excitation"))
+      check_excitation(yaml.map("excitation"), file.simulation.excitation, file.rig);
+  });
+  problems.reading([&] { file.test_runs = read_test_runs(yaml, file.rig); });
+  problems.reading([&] { file.diagnosis = diagnosis::read_diagnosis_settings(yaml.map("diagnosis")); });
+  problems.reading([&] {
+    if (const auto drive = yaml.optional_map("drive"))
+      file.drive = read_drive(*drive, file.rig.reduction_ratio);
+  });
+  if (problems.any()) {
+    yaml.ignore("commissioned");  // not read yet
+    yaml.finish();
+  }
+  problems.raise(source);
   if (file.diagnosis.limits && !file.diagnosis.limits->angular && file.rig.mesh.angular())
     yaml.map("diagnosis").fail("limits", "a rig without base_radius needs limits of backlash_angle");
   if (file.simulation.sensors.of(record::Channel::motor_current).declared &&
@@ -235,8 +247,14 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
     yaml.map("sensors").fail("motor_current", "needs gear_train.motor.torque_constant (N m/A)");
   fill_from_rig(file.rig, file.diagnosis);
   read_known_values(yaml, file);
+  if (file.diagnosis.waveform || file.diagnosis.apd) {  // they rest on both
+    yaml.map("excitation");
+    yaml.map("sensors");
+  }
+  problems.raise(source);
   if (file.diagnosis.waveform) use_spread(file);
   yaml.finish();
+  problems.raise(source);
   if (file.diagnosis.position_difference)
     file.diagnosis.position_difference->output_torque_reversed =
         file.simulation.sensors.of(record::Channel::output_torque).reversed;

@@ -42,7 +42,7 @@ DiagnoserNode::DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandl
       inputs_(channels_of(settings.joints)),
       updater_(handle, private_handle) {
   for (const std::string& topic : inputs_.topics()) topics_.push_back(handle_.resolveName(topic));
-  updater_.setHardwareID(settings.joints.front().rig.rig.name);
+  updater_.setHardwareID("none");  // each joint has its own
   serve_live(settings);
   advertise();
   ros::NodeHandle samples(handle_);
@@ -68,12 +68,14 @@ void DiagnoserNode::add_joint(MonitorSettings settings, const DiagnoserSettings&
         JointHistory::Settings{joint_path(common.history, settings.joint, ".csv"), common.history_interval,
                                limits ? limits->angular : mesh.angular(), settings.rig.digest});
   settings.job_memory = common.job_memory;
+  settings.silent = common.diagnostics.stale;
+  if (!common.waveform) settings.rig.diagnosis.leave_out_waveform();
   joint.monitor = std::make_unique<JointMonitor>(
       std::move(settings),
       [this, place = joints_.size()](const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis) {
         publish(joints_[place], stamp, diagnosis);
       },
-      common.waveform ? &fits_ : nullptr);
+      &fits_);
   joint.diagnostics = std::make_unique<JointDiagnostics>(*joint.monitor, joint.history.get(), joined(topics_),
                                                          common.diagnostics);
   joint.diagnostics->add_to(updater_);
@@ -228,8 +230,9 @@ JointMonitor* DiagnoserNode::find_monitor(const std::string& name, std::string& 
 bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
                                 backlash_diagnosis::Diagnose::Response& response) {
   response.verdict = to_message(diagnosis::Verdict(), {});
-  JointMonitor* monitor = find_monitor(request.joint, response.message);
-  if (!monitor) return true;
+  const Joint* joint = find(request.joint, response.message);
+  if (!joint) return true;
+  JointMonitor* const monitor = joint->monitor.get();
   if (!(request.timeout >= 0) || request.timeout > 1e6) {
     response.message = "timeout = " + to_text(request.timeout) + ": must be between 0 and 1e6 s";
     return true;
@@ -237,6 +240,10 @@ bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
   std::string note;
   ros::Time stamp;
   const diagnosis::Diagnosis diagnosis = monitor->diagnose(request.periods, request.timeout, note, stamp);
+  if (diagnosis.estimates.empty()) {
+    response.message = joint->diagnostics->input();
+    return true;
+  }
   response.verdict = to_message(diagnosis.verdict, diagnosis.estimates);
   for (const diagnosis::Estimate& estimate : diagnosis.estimates) {
     response.estimates.push_back(to_message(estimate, stamp));
@@ -247,7 +254,10 @@ bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
   response.distribution.joint = monitor->joint();
   response.success = diagnosis.verdict.estimate >= 0 && note.empty();
   response.message = note.empty() ? diagnosis.verdict.message : note + "; " + diagnosis.verdict.message;
-  for (const std::string& warning : monitor->state().warnings()) response.message += "; warning: " + warning;
+  const MonitorState state = monitor->state();
+  for (const std::string& warning : state.warnings()) response.message += "; warning: " + warning;
+  if (const std::string silence = joint->diagnostics->silence(state); !silence.empty())
+    response.message += "; " + silence;
   return true;
 }
 
@@ -283,6 +293,8 @@ void DiagnoserNode::set_baseline(Joint& joint, backlash_diagnosis::SetBaseline::
   std::string note;
   ros::Time stamp;
   const diagnosis::Diagnosis diagnosis = monitor.diagnose(0, 0, note, stamp);
+  if (diagnosis.estimates.empty()) note = joint.diagnostics->input();
+  if (note.empty()) note = monitor.change_of_play();
   if (!note.empty()) {
     response.message = "no baseline set: " + note;
     return;

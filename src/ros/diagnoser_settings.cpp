@@ -36,8 +36,8 @@ parameters (private)
   history_interval   s at least from one entry to the next, by the stamps; default 60
   job_memory   GB that the process of an action may use, and that which builds a missing curve;
             default 4
-  waveform  whether the estimator waveform is fitted, in the background at the lowest priority; default
-            true
+  waveform  whether the estimator waveform is fitted, in the background at the lowest priority as
+            gap_traverse is; default true
   folder    the only folder in which goals of actions may name files, relative to it or absolute;
             default: backlash_diagnosis in ROS_HOME (~/.ros)
 

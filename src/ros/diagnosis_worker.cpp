@@ -25,7 +25,8 @@ void yield_to_samples() {
 
 diagnosis::Diagnosis DiagnosisTask::compute() const {
   diagnosis::Diagnosis diagnosis = diagnosis::diagnose(window, settings, curve.get(), baseline);
-  if (fitted) diagnosis::recall_waveform(diagnosis, *fitted, window, settings.limits, baseline);
+  for (const diagnosis::EarlierAnswer& answer : earlier)
+    diagnosis::recall(diagnosis, answer, window, settings.limits, baseline);
   return diagnosis;
 }
 
@@ -53,6 +54,12 @@ long DiagnosisWorker::replaced() const {
   return replaced_;
 }
 
+bool DiagnosisWorker::rested(double times) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (working_ || !waiting_.empty()) return false;
+  return std::chrono::steady_clock::now() - ended_ >= times * (ended_ - began_);
+}
+
 void DiagnosisWorker::stop() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -74,12 +81,17 @@ void DiagnosisWorker::run() {
       task = std::move(waiting_.front());
       waiting_.pop_front();
       samples_ -= task.window.record.size();
+      working_ = true;
+      began_ = std::chrono::steady_clock::now();
     }
     try {
       work_(task);
     } catch (const std::exception& error) {
       ROS_ERROR("a diagnosis failed: %s", error.what());
     }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    working_ = false;
+    ended_ = std::chrono::steady_clock::now();
   }
 }
 

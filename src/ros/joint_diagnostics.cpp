@@ -15,6 +15,9 @@ using DiagnosticStatus = diagnostic_msgs::DiagnosticStatus;
 
 constexpr double kSecondsPerYear = 365.25 * 86400;
 constexpr double kAnotherTime = 3600;  // s: stamps so old or new are of a recording, not late
+constexpr std::size_t kInput = 1;      // place of the concern
+// s of wall time without an estimate while samples come: choice. Also three periods or intervals without one.
+constexpr double kOldEstimate = 30, kMissed = 3;
 
 // s: choice. Each look at 10 s of 1 kHz takes 8 ms of a core: 1.3 % for 16 joints.
 constexpr double kLookedAt = 10, kBetweenLooks = 10;
@@ -43,6 +46,24 @@ double age_of(const MonitorState& state) {
   return state.any_sample ? now() - state.last_arrival.toSec() : 0;
 }
 
+/// s of wall time since the latest estimate, where it is too old for what the samples of now are; else 0.
+double overdue(const MonitorState& state, double estimate_interval) {
+  const double since = now() - state.last_estimate.toSec();
+  return since > std::max(kOldEstimate, kMissed * std::max(state.period, estimate_interval)) ? since : 0;
+}
+
+/// Why the clock of ROS cannot be compared with the stamps, and what to do; empty: a recording of another
+/// day.
+std::string clock_problem(double latency) {
+  if (!ros::Time::isSimTime()) return "";
+  const std::string remedy =
+      "; without a simulation or `rosbag play --clock`: rosparam set /use_sim_time false, and "
+      "start the nodes again";
+  if (ros::Time::now().isZero()) return "/use_sim_time is true, but nobody publishes /clock" + remedy;
+  return "the stamps are " + to_text(std::round(std::fabs(latency))) + " s " +
+         (latency > 0 ? "behind" : "ahead of") + " /clock: they are of another clock" + remedy;
+}
+
 const diagnosis::Mismatch* mismatch_of(const MonitorState& state, diagnosis::Mismatch::Concern concern) {
   if (!state.latest || !state.latest->mismatch) return nullptr;
   return state.latest->mismatch->concern == concern ? &*state.latest->mismatch : nullptr;
@@ -67,6 +88,7 @@ void JointDiagnostics::add_to(diagnostic_updater::DiagnosticTaskVector& tasks) {
   for (Concern& concern : concerns_)
     tasks.add(concern.name, [this, &concern](Status& status) {
       const std::lock_guard<std::mutex> lock(mutex_);
+      status.hardware_id = monitor_.rig().rig.name;
       status.level = concern.status.level;
       status.message = concern.status.message;
       status.values = concern.status.values;
@@ -99,6 +121,17 @@ bool JointDiagnostics::update() {
   return changed;
 }
 
+std::string JointDiagnostics::input() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return concerns_[kInput].status.message;
+}
+
+std::string JointDiagnostics::silence(const MonitorState& state) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double age = age_of(state);
+  return age > settings_.stale ? "no message for " + to_text(std::round(age)) + " s" : "";
+}
+
 void JointDiagnostics::look_at_recording() {
   const double time = ros::SteadyTime::now().toSec();
   if (time < next_look_) return;
@@ -107,10 +140,19 @@ void JointDiagnostics::look_at_recording() {
 }
 
 void JointDiagnostics::describe_backlash(const MonitorState& state, Status& status) {
-  if (!state.latest) {
-    status.summary(DiagnosticStatus::WARN, "no whole excitation period yet");
+  if (!monitor_.rig().diagnosis.serves_any()) {
+    status.summary(DiagnosticStatus::OK,
+                   "not judged: the rig file declares nothing that a method could go by (one "
+                   "inertia has no play)");
+  } else if (!state.latest) {
+    status.summary(DiagnosticStatus::WARN,
+                   monitor_.rig().diagnosis.apd ? "no whole excitation period yet" : "no estimate yet");
   } else if (age_of(state) > settings_.stale) {
     status.summary(DiagnosticStatus::STALE, "no sample for " + to_text(std::round(age_of(state))) +
+                                                " s; before: " + state.latest->verdict.message);
+  } else if (const double since = overdue(state, monitor_.estimate_interval()); since > 0) {
+    status.summary(DiagnosticStatus::STALE, "samples come, but no estimate for " +
+                                                to_text(std::round(since)) +
                                                 " s; before: " + state.latest->verdict.message);
   } else {
     status.summary(level_of(state.latest->verdict.grade), state.latest->verdict.message);
@@ -173,7 +215,7 @@ void JointDiagnostics::describe_input(const MonitorState& state, Status& status)
   status.add("Last problem", state.last_problem);
 }
 
-void JointDiagnostics::summarise_input(const MonitorState& state, double age, Status& status) {
+void JointDiagnostics::summarise_input(const MonitorState& state, double age, Status& status) const {
   const diagnosis::StreamCounters& c = state.counters;
   if (!state.any_sample && state.bad_messages + c.not_a_number == 0)
     status.summary(DiagnosticStatus::WARN,
@@ -188,7 +230,10 @@ void JointDiagnostics::summarise_input(const MonitorState& state, double age, St
     status.summary(DiagnosticStatus::WARN,
                    "samples come faster than they can be diagnosed: estimates are left out");
   else if (std::fabs(state.latency) > kAnotherTime)
-    status.summary(DiagnosticStatus::OK, "receiving; the stamps are of another time than now");
+    clock_problem(state.latency).empty()
+        ? status.summary(DiagnosticStatus::OK,
+                         "receiving; the stamps are of another time than now: a recording")
+        : status.summary(DiagnosticStatus::WARN, clock_problem(state.latency));
   else if (state.latency > settings_.latency_limit)
     status.summary(DiagnosticStatus::WARN,
                    "samples arrive " + to_text(std::round(1000 * state.latency)) + " ms after their stamps");

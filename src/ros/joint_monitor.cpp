@@ -7,6 +7,8 @@
 #include <chrono>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/utc.h"
+#include "backlash_diagnosis/diagnosis/play_change.h"
 #include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "backlash_diagnosis/ros/curve_job.h"
 
@@ -15,7 +17,15 @@ namespace {
 
 /// Of a fit of the waveform: its twelve reversals, and the half period before the first.
 constexpr long kFittedPeriods = 7;
-constexpr const char* kNoFitYet = "being fitted to seven periods, which takes seconds: no answer yet";
+constexpr const char* kWaveform = "waveform";
+constexpr const char* kGapTraverse = "gap_traverse";
+constexpr const char* kNoWaveformYet = "being fitted to seven periods, which takes seconds: no answer yet";
+constexpr const char* kNoTraverseYet = "being fitted in the background, which takes seconds: no answer yet";
+/// Times as long as the estimate before it took, without an APD: a tenth of a processor for each joint;
+/// choice.
+constexpr double kRest = 9;
+constexpr std::chrono::milliseconds kLook{
+    100};  // choice: from one look whether samples still come to the next
 
 diagnosis::StreamSettings stream_settings(const MonitorSettings& settings) {
   diagnosis::StreamSettings stream;
@@ -39,11 +49,12 @@ JointMonitor::JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis, B
       stream_(stream_settings(settings_)),
       on_diagnosis_(std::move(on_diagnosis)),
       fits_(fits),
-      waveform_(fits ? settings_.rig.diagnosis.waveform : std::nullopt),
+      all_methods_(settings_.rig.diagnosis),
       worker_([this](const DiagnosisTask& task) { work(task); }) {
-  if (waveform_)
-    diagnosis_settings_.leave_out_waveform(kNoFitYet);
-  else if (settings_.rig.diagnosis.waveform)
+  last_sample_ = ros::WallTime::now();
+  if (all_methods_.waveform && fits_)
+    diagnosis_settings_.leave_out_waveform(kNoWaveformYet);
+  else if (all_methods_.waveform)
     diagnosis_settings_.leave_out_waveform();
   if (settings_.baseline) set_baseline(settings_.baseline);
   if (settings_.curve) {
@@ -56,11 +67,12 @@ JointMonitor::JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis, B
   } else {
     curve_state_ = "waiting for samples to know their rate";
   }
-  if (waveform_) fits_->add(this, [this] { return fit(); });
+  if (all_methods_.waveform) background(kWaveform);
+  if (all_methods_.gap_traverse) background(kGapTraverse);
 }
 
 JointMonitor::~JointMonitor() {
-  if (waveform_) fits_->remove(this);
+  if (fits_) fits_->remove(this);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     stop_ = true;
@@ -68,6 +80,10 @@ JointMonitor::~JointMonitor() {
   }
   worker_.stop();
   if (builder_.joinable()) builder_.join();
+}
+
+void JointMonitor::background(const std::string& method) {
+  if (fits_) fits_->add(this, [this, method] { return fit(method); });
 }
 
 std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const record::ChannelValues& values,
@@ -80,20 +96,22 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const rec
     return std::nullopt;
   }
   latency_ = (ros::Time::now() - stamp).toSec();
-  const long restarts = stream_.counters().restarts;
+  const long restarts = stream_.counters().restarts, accepted = stream_.counters().accepted;
   const double time = clock_.seconds(stamp);
   const diagnosis::PeriodResult* period = stream_.add(time, values);
   if (stream_.counters().restarts != restarts) {
     reported_periods_ = 0;
     estimated_.reset();
-    fitted_.reset();
+    fitted_.clear();
   }
   if (!stream_.counters().last_problem.empty())
     last_problem_ = topic + ": " + stream_.counters().last_problem;
-  const long periods = stream_.periods();
-  const bool complete = settings_.rig.diagnosis.apd ? period != nullptr : periods > reported_periods_;
-  if (!complete) return std::nullopt;
-  reported_periods_ = periods;
+  if (stream_.counters().accepted > accepted) last_sample_ = last_arrival_;
+  if (const long periods = stream_.periods(); periods > reported_periods_) {
+    reported_periods_ = periods;
+    changed_.notify_all();
+  }
+  if (!moment(period, time)) return std::nullopt;
   if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd)
     if (const double interval = stream_.sampling_interval(); interval > 0)
       start_building(studies::nominal_sampling_rate(interval));
@@ -107,6 +125,14 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const rec
   return PeriodReport{*period, stream_.period(), last};
 }
 
+/// Whether a running estimate may be due with this sample. Called with the lock held.
+bool JointMonitor::moment(const diagnosis::PeriodResult* period, double time) const {
+  if (settings_.rig.diagnosis.apd) return period != nullptr;
+  if (!all_methods_.serves_any()) return false;
+  const std::vector<double>& kept = stream_.kept().time;
+  return !kept.empty() && time - kept.front() >= diagnosis::kFirstPeriodSearch && worker_.rested(kRest);
+}
+
 /// The running estimate of this moment, where one is due. Called with the lock held.
 std::optional<DiagnosisTask> JointMonitor::due(double time) {
   // Half a sample is what rounding and jitter may take from an interval of whole periods.
@@ -115,10 +141,13 @@ std::optional<DiagnosisTask> JointMonitor::due(double time) {
   DiagnosisTask next = task(settings_.window);
   if (next.window.record.time.empty()) return std::nullopt;
   estimated_ = time;
-  if (next.settings.gap_traverse) {
-    next.settings.gap_traverse.reset();
-    next.settings.no_gap_traverse =
-        "takes a second: not in the running estimates, but in answers of ~diagnose";
+  if (all_methods_.gap_traverse) {
+    if (fits_)
+      next.settings.leave_out_gap_traverse(kNoTraverseYet);
+    else
+      next.settings.leave_out_gap_traverse();
+    if (const auto found = fitted_.find(kGapTraverse); found != fitted_.end())
+      next.earlier.push_back(found->second);
   }
   return next;
 }
@@ -131,7 +160,7 @@ DiagnosisTask JointMonitor::task(long periods) const {
   task.settings = diagnosis_settings_;
   task.curve = curve_;
   task.baseline = baseline_;
-  task.fitted = fitted_;
+  if (const auto found = fitted_.find(kWaveform); found != fitted_.end()) task.earlier = {found->second};
   return task;
 }
 
@@ -141,36 +170,52 @@ void JointMonitor::work(const DiagnosisTask& task) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     latest_ = diagnosis;
+    last_estimate_ = ros::WallTime::now();
   }
   if (on_diagnosis_) on_diagnosis_(task.stamp, *diagnosis);
 }
 
-/// In the thread of the background fits.
-bool JointMonitor::fit() {
+/// In the thread of the background fits. Crossings of the gap are looked at in the newer half of what is
+/// kept, so that an answer follows a play that changes, and in all of it where that half shows too few.
+bool JointMonitor::fit(const std::string& method) {
+  const bool waveform = method == kWaveform;
   DiagnosisTask newest;
   long restarts = 0;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    newest = task(kFittedPeriods);
+    newest = task(waveform ? kFittedPeriods : 0);
     restarts = stream_.counters().restarts;
+    const auto found = fitted_.find(method);
+    const std::vector<double>& time = newest.window.record.time;
+    if (time.empty() || (found != fitted_.end() && found->second.end >= time.back())) return false;
   }
-  const std::vector<double>& time = newest.window.record.time;
-  if (time.empty() || (newest.fitted && newest.fitted->end >= time.back())) return false;
   const bool more_to_come = settings_.keep > (kFittedPeriods + 1) * newest.window.period;
-  if (newest.window.period > 0 && newest.window.count < kFittedPeriods && more_to_come) return false;
-  newest.settings.waveform = waveform_;
-  diagnosis::EarlierWaveform found =
-      diagnosis::fit_waveform(newest.window, newest.settings, newest.curve.get());
+  if (waveform && newest.window.period > 0 && newest.window.count < kFittedPeriods && more_to_come)
+    return false;
+  const auto answer = [&](const diagnosis::PeriodWindow& window) {
+    return diagnosis::answer_of(method, window, all_methods_, newest.curve.get());
+  };
+  const record::Record& all = newest.window.record;
+  const double half = all.time.back() - 0.5 * settings_.keep;
+  std::optional<diagnosis::EarlierAnswer> found;
+  if (!waveform && half > all.time.front())
+    found = answer({all.slice(half, HUGE_VAL), newest.window.period, 0, {}});
+  if (!found || found->estimate.status == diagnosis::Status::insufficient_data) found = answer(newest.window);
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (stream_.counters().restarts == restarts) fitted_ = std::move(found);
+  if (stream_.counters().restarts == restarts) fitted_[method] = std::move(*found);
   return true;
 }
 
 diagnosis::Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note,
                                             ros::Time& stamp) {
   std::unique_lock<std::mutex> lock(mutex_);
-  const auto ready = [&] { return stop_ || (stream_.periods() >= wanted_periods(periods) && !building_); };
-  changed_.wait_for(lock, std::chrono::duration<double>(timeout), ready);
+  const auto silence = [&] { return (ros::WallTime::now() - last_sample_).toSec(); };
+  const auto ready = [&] {
+    if (stop_) return true;
+    return !building_ && (stream_.periods() >= wanted_periods(periods) || silence() > settings_.silent);
+  };
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout);
+  while (!ready() && std::chrono::steady_clock::now() < end) changed_.wait_for(lock, kLook);
   const long available = stream_.periods();
   const DiagnosisTask asked = task(periods);
   // Without an APD all that is kept will do, whether it has periods or not.
@@ -179,12 +224,33 @@ diagnosis::Diagnosis JointMonitor::diagnose(long periods, double timeout, std::s
     note = fmt::format("only {} of {} whole periods arrived{}", available, wanted_periods(periods),
                        last_problem_.empty() ? "" : "; last problem: " + last_problem_);
   const std::string curve_state = curve_state_;
+  const bool nothing = stream_.counters().accepted == 0;
   stamp = asked.stamp;
   lock.unlock();  // the subscriber goes on while this computes
+  if (nothing) return {};
   diagnosis::Diagnosis diagnosis = asked.compute();
   for (diagnosis::Estimate& estimate : diagnosis.estimates)
     if (diagnosis::needs_curve(estimate.method) && !asked.curve) estimate.message += " (" + curve_state + ")";
   return diagnosis;
+}
+
+std::string JointMonitor::change_of_play() const {
+  record::Record kept;
+  std::shared_ptr<const diagnosis::MonitoringCurve> curve;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    kept = stream_.kept();
+    curve = curve_;
+  }
+  const auto change = diagnosis::play_change(kept, all_methods_, curve.get());
+  if (!change) return "";
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double ago = kept.time.back() - change->to;
+  return fmt::format(
+      "the play changed between {} and {}, {:.0f} s before the last sample: {}; ask again after {:.0f} s "
+      "of the play that is to be the baseline",
+      utc_time(clock_.stamp(change->from).toSec()), utc_time(clock_.stamp(change->to).toSec()), ago,
+      diagnosis::plays_text(*change), settings_.keep);
 }
 
 void JointMonitor::start_building(double rate) {
@@ -250,6 +316,11 @@ void JointMonitor::set_limits(const std::optional<diagnosis::Limits>& limits) {
   diagnosis_settings_.limits = limits;
 }
 
+double JointMonitor::estimate_interval() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return settings_.estimate_interval;
+}
+
 std::optional<diagnosis::Limits> JointMonitor::limits() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return diagnosis_settings_.limits;
@@ -293,6 +364,7 @@ MonitorState JointMonitor::state() const {
   state.periods = stream_.periods();
   state.any_sample = stream_.counters().accepted > 0;
   state.last_arrival = last_arrival_;
+  state.last_estimate = last_estimate_;
   state.latest = latest_;
   state.replaced = worker_.replaced();
   return state;

@@ -28,6 +28,13 @@ bool is_number(const XmlRpc::XmlRpcValue& value) {
          value.getType() == XmlRpc::XmlRpcValue::TypeInt;
 }
 
+/// Of a number that came as text.
+std::string hint(XmlRpc::XmlRpcValue value) {
+  if (value.getType() != XmlRpc::XmlRpcValue::TypeString) return "";
+  const bool is_one = static_cast<bool>(parse_number(static_cast<std::string>(value)));
+  return is_one ? ", this is text: YAML takes 2e-5 for text, write 2.0e-5" : "";
+}
+
 }  // namespace
 
 Parameters::Parameters(const ros::NodeHandle& private_handle) : handle_(private_handle) {}
@@ -51,7 +58,7 @@ double Parameters::number(const std::string& name, double absent, const Range& r
   bool present;
   XmlRpc::XmlRpcValue found = value(name, present);
   if (!present) return absent;
-  if (!is_number(found)) throw InvalidParameter("~" + name, shown(found), "must be a number");
+  if (!is_number(found)) throw InvalidParameter("~" + name, shown(found), "must be a number" + hint(found));
   const double number =
       found.getType() == XmlRpc::XmlRpcValue::TypeInt ? static_cast<int>(found) : static_cast<double>(found);
   if (!std::isfinite(number)) throw InvalidParameter("~" + name, number, "must be finite");

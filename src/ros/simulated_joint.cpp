@@ -22,7 +22,7 @@ SimulatedJoint::SimulatedJoint(const JointSettings& settings, const ros::NodeHan
       title_(name_ + ": simulating " + settings.file.rig.name + " (" + settings.file.source + ")"),
       names_(name_),
       simulation_(settings.file.rig, settings.file.simulation),
-      controls_(controls_of(settings), access(), handle, private_handle),
+      controls_(controls_of(settings), access(settings), handle, private_handle),
       rig_description_(publish_rig_description(handle, settings.description)) {
   if (const record::ChannelMap& channels = settings.file.channels; channels.declared)
     for (const std::string& topic : channels.topics())
@@ -30,9 +30,12 @@ SimulatedJoint::SimulatedJoint(const JointSettings& settings, const ros::NodeHan
   set_rig_ = ros::NodeHandle(private_handle).advertiseService("set_rig", &SimulatedJoint::set_rig, this);
 }
 
-JointAccess SimulatedJoint::access() {
+JointAccess SimulatedJoint::access(const JointSettings& settings) {
   return {[this] { return simulation_.plant().gear_train().backlash(); },
-          [this](double backlash) { simulation_.plant().set_backlash(backlash); },
+          [this, most = Range::between(0, settings.file.rig.mesh.most_backlash())](double backlash) {
+            if (!most.contains(backlash)) throw InvalidParameter("backlash", backlash, most.text());
+            simulation_.plant().set_backlash(backlash);
+          },
           [this](double torque) { simulation_.plant().set_torque(torque); },
           [this]() -> simulation::SensorModel& { return simulation_.sensors(); }};
 }

@@ -80,7 +80,7 @@ class Overrides {
                              "cannot be given together with ~" + given_.scope() + "backlash");
     double& backlash = file_.rig.mesh.backlash;
     double half_gap = backlash / 2;
-    given_.number("backlash", Range::not_negative(), backlash);
+    given_.number("backlash", Range::between(0, file_.rig.mesh.most_backlash()), backlash);
     given_.number("half_gap", Range::not_negative(), half_gap);
     if (half) backlash = 2 * half_gap;
   }

@@ -124,6 +124,9 @@ std::unique_ptr<Excitation> ExcitationSettings::create() const {
   if (type == "sine_speed") return sine_speed_excitation(controller, bias, amplitude, frequency, ramp);
   if (type == "moves") return moves_excitation(controller, moves);
   if (type == "fourier") return fourier_excitation(controller, fourier, moves.position_gain);
+  if (type.empty())
+    throw InvalidParameter("excitation", "absent",
+                           "a simulation needs it: give `excitation` in the rig file");
   throw InvalidParameter("excitation.type", type, "must be one of " + joined(kTypes));
 }
 

@@ -25,7 +25,8 @@ SensorSettings read_sensor(const YamlReader& yaml) {
 SensorsSettings read_sensors(const YamlReader& yaml) {
   SensorsSettings settings;
   settings.sampling_rate = yaml.number("sampling_rate", Range::positive());
-  settings.seed = static_cast<std::uint64_t>(yaml.integer("seed", 0, 1L << 53));
+  settings.seeded = yaml.has("seed");
+  if (settings.seeded) settings.seed = static_cast<std::uint64_t>(yaml.integer("seed", 0, 1L << 53));
   for (record::Channel channel : record::kChannels)
     if (const auto sensor = yaml.optional_map(record::channel_name(channel)))
       settings.of(channel) = read_sensor(*sensor);
@@ -42,6 +43,9 @@ void SensorModel::reset() {
 }
 
 void SensorModel::seed(std::size_t channel) {
+  if (!settings_.seeded)
+    throw InvalidParameter("sensors.seed", "absent",
+                           "noise is drawn from it: give one in the rig file, or --seed");
   noise_[channel].emplace(settings_.seed, static_cast<std::uint32_t>(channel));
 }
 

@@ -24,8 +24,14 @@ model::Observation together(const model::Observation& torque, model::Observation
 
 SimulationSettings read_simulation_settings(const YamlReader& yaml) {
   SimulationSettings settings;
-  settings.excitation = read_excitation(yaml.map("excitation"));
-  settings.sensors = read_sensors(yaml.map("sensors"));
+  if (const auto excitation = yaml.optional_map("excitation"))
+    settings.excitation = read_excitation(*excitation);
+  else
+    settings.excitation.type.clear();
+  if (const auto sensors = yaml.optional_map("sensors"))
+    settings.sensors = read_sensors(*sensors);
+  else
+    settings.sensors.sampling_rate = 0;
   if (const auto solver = yaml.optional_map("solver")) settings.solver = read_solver(*solver);
   return settings;
 }
@@ -41,6 +47,9 @@ Simulation::Simulation(const model::Rig& rig, const SimulationSettings& settings
     : plant_(rig, settings.excitation, settings.solver),
       sensors_(settings.sensors),
       rate_(settings.sensors.sampling_rate) {
+  if (!(rate_ > 0))
+    throw InvalidParameter("sensors.sampling_rate", "absent",
+                           "a simulation needs it: give `sensors` in the rig file");
   const double delay = model::sensing(rig.terms).torque_delay, skew = rig.encoder_skew;
   const double latest = std::min({0.0, delay, delay + skew});  // the torque is 0
   torque_ = late(-latest, rate_);

@@ -210,6 +210,8 @@ Json report(const Inputs& in, const diagnosis::Trend& trend, const std::string& 
   json["date"] = date(trend.time);
   json["reaches"] = crossing_json(trend);
   json["message"] = trend.message;
+  const auto since = diagnosis::silent_since(in.history.entries, double(std::time(nullptr)));
+  json["silent_since"] = since ? date(*since) : Json(nullptr);
   json["warnings"] = in.history.warnings;
   json["series"] = series_json(in);
   return json;
@@ -234,6 +236,8 @@ int run(const Arguments& arguments) {
     if (!out.empty()) write_text(out, json);
     for (const std::string& warning : in.history.warnings) std::cerr << "backlash_trend: " << warning << '\n';
     std::cout << trend.message << '\n';
+    if (const auto since = diagnosis::silent_since(in.history.entries, double(std::time(nullptr))))
+      std::cout << "nothing was reported since " << utc_time(*since) << '\n';
   }
   if (arguments.has("plot")) {
     std::cout.flush();

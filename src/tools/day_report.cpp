@@ -25,7 +25,10 @@ Command command() {
       {"out", "DAY.html", "page to write, with the plots inside", true},
       {"json", "DAY.json", "the same as data"},
       {"hours", "H", "length of the day; default: 24"},
-      {"until", "TIME", "its end, UTC, as 2027-03-01T12:00:00Z; default: the last entry of the folder"},
+      {"until", "TIME",
+       "its end, UTC, as 2027-03-01T12:00:00Z; default: the last entry of the folder, and since when there "
+       "is "
+       "none"},
   };
   c.notes =
       "HISTORY_FOLDER is what `~history` of the diagnoser and of change_watch names: JOINT.csv and "
@@ -35,7 +38,8 @@ Command command() {
       "  0   no change, all that was told is good\n"
       "  1   watch: the last grade of a joint\n"
       "  2   a joint has changed, or its last grade is service or stop\n"
-      "  3   no estimate told the play of any joint, and no change\n";
+      "  3   no estimate told the play of any joint, and no change; or all were good, and nothing "
+      "was reported since\n";
   return c;
 }
 
@@ -61,7 +65,7 @@ int exit_code(const report::Day& day) {
           : told->grade == "watch"                          ? kWatch
                                                             : kHealthy);
   }
-  return code;
+  return code == kHealthy && report::silent(day) ? kInconclusive : code;
 }
 
 int run(const Arguments& arguments) {
@@ -69,8 +73,8 @@ int run(const Arguments& arguments) {
   const std::string out = arguments.text("out"), json = arguments.text("json");
   check_output(out, {});
   if (!json.empty()) check_output(json, {out});
-  const report::Day day =
-      report::read_day(folder, until(arguments), arguments.number("hours", 24, Range::positive()));
+  const report::Day day = report::read_day(
+      folder, until(arguments), arguments.number("hours", 24, Range::positive()), double(std::time(nullptr)));
   if (!json.empty()) write_text(json, report::day_json(day));
   report::Provenance provenance;
   provenance.command = {"day_report"};

@@ -40,7 +40,7 @@ Command command() {
        true},
       {"healthy", "RECORD...", "records (.csv or .bag) of the healthy machine, better two tasks than one",
        true},
-      {"json", "OUT.json", "changes with size, onset and intervals", true},
+      {"json", "OUT.json", "changes with size, onset and intervals; default: the summary alone"},
       {"false-alarms-per-hour", "X",
        "how often a healthy machine may be called changed; default: 1/720, once a month"},
   };
@@ -146,7 +146,7 @@ int detect(const Arguments& arguments) {
   files.push_back(inputs.record);
   for (const std::string& file : files) check_record_path(file);
   files.push_back(inputs.rig);
-  check_output(arguments.text("json"), files);
+  if (arguments.has("json")) check_output(arguments.text("json"), files);
   changes::ChangeSettings settings;
   settings.false_alarms_per_hour = inputs.false_alarms_per_hour;
   changes::Changes found;
@@ -159,7 +159,8 @@ int detect(const Arguments& arguments) {
     found.cannot_tell = error.what();
     found.noise = kNaN;  // nothing was learned
   }
-  write_text(arguments.text("json"), door.with_findings(changes::change_json(found, inputs)));
+  if (arguments.has("json"))
+    write_text(arguments.text("json"), door.with_findings(changes::change_json(found, inputs)));
   std::cout << changes::change_summary(found);
   if (!found.changes.empty()) return kFault;
   if (found.cannot_tell.empty()) return kHealthy;

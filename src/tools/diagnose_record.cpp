@@ -39,7 +39,9 @@ Command command() {
   c.summary = "Estimates the backlash in a record by all methods that it can serve and grades it.";
   c.positional = {"RECORD.{csv,bag,mcap,db3,json,npz}"};
   c.options = {
-      {"json", "OUT.json", "report to write; '-' writes it to standard output instead of the summary", true},
+      {"json", "OUT.json",
+       "report to write; '-' writes it to standard output instead of the summary; "
+       "default: the summary alone"},
       {"report", "OUT.html", "page for people: verdict, estimates, plots, and how it came about"},
       {"rig", "RIG.yaml",
        "rig file: what to look for and which limits hold; without it only what the curve allows"},
@@ -229,7 +231,7 @@ void check_outputs(const Arguments& arguments) {
   if (!saved.empty()) check_output(saved, inputs);  // a baseline may be renewed
   if (!saved.empty() && saved == out) throw UsageError("--json and --save-baseline name the same file");
   if (arguments.has("baseline")) inputs.push_back(arguments.text("baseline"));
-  if (out != kStandardOutput) check_output(out, inputs);
+  if (!out.empty() && out != kStandardOutput) check_output(out, inputs);
   if (!arguments.has("report")) return;
   const std::string page = arguments.text("report");
   check_output(page, inputs);
@@ -298,7 +300,7 @@ int diagnose_record(const Arguments& arguments) {
   if (out == kStandardOutput) {
     std::cout << json;
   } else {
-    write_text(out, json);
+    if (!out.empty()) write_text(out, json);
     report::print_summary(report, std::cout);
   }
   if (arguments.has("report"))

@@ -34,7 +34,9 @@ Command command() {
       {"rig", "RIG.yaml", "the machine as declared: structure, and values to start from (within some 40 %)",
        true},
       {"out", "FITTED.yaml", "the rig file with the fitted values, each with its standard error", true},
-      {"json", "OUT.json", "procedures, parameters with standard errors, errors per channel, warnings", true},
+      {"json", "OUT.json",
+       "procedures, parameters with standard errors, errors per channel, warnings; "
+       "default: FITTED.json beside --out"},
       {"plot", "OUT.png", "also draw what the procedures saw"},
       {"payload", "[RECORD=]WEIGHT",
        "what the machine carries in the first RECORD, or in that one: \"2.805 kg +- 0.005\" (one standard "
@@ -74,7 +76,8 @@ Command command() {
 void check_outputs(const Arguments& arguments) {
   std::vector<std::string> inputs = arguments.positionals();
   inputs.push_back(arguments.text("rig"));
-  const std::string json = arguments.text("json"), out = arguments.text("out"), plot = arguments.text("plot");
+  const std::string json = json_beside_out(arguments), out = arguments.text("out"),
+                    plot = arguments.text("plot");
   if (json == out) throw UsageError("--json and --out name the same file");
   check_output(json, inputs);
   check_output(out, inputs);
@@ -103,11 +106,11 @@ int identify_joint(const Arguments& arguments, RecordDoor& door) {
   for (const record::Record& record : records)
     for (const std::string& warning : record.warnings) found.warnings.push_back(record.name + ": " + warning);
   write_text(arguments.text("out"), identification::fitted_rig_text(file, found));
-  write_text(arguments.text("json"), door.with_findings(findings::identification_json(
-                                         found, arguments.text("rig"), arguments.positionals())));
+  write_text(json_beside_out(arguments), door.with_findings(findings::identification_json(
+                                             found, arguments.text("rig"), arguments.positionals())));
   findings::print_summary(found, std::cout);
   std::cout.flush();
-  if (arguments.has("plot")) plot_identification(arguments.text("json"), arguments.text("plot"));
+  if (arguments.has("plot")) plot_identification(json_beside_out(arguments), arguments.text("plot"));
   return found.several || found.unexplained ? kInconclusive : kHealthy;
 }
 
@@ -125,8 +128,8 @@ int identify_machine(const Arguments& arguments) {
     std::cerr << "identify: " << error.what() << '\n';
     identification::Identification nothing;
     nothing.warnings.emplace_back(error.what());
-    write_text(arguments.text("json"), door.with_findings(findings::identification_json(
-                                           nothing, arguments.text("rig"), arguments.positionals())));
+    write_text(json_beside_out(arguments), door.with_findings(findings::identification_json(
+                                               nothing, arguments.text("rig"), arguments.positionals())));
     return kInconclusive;
   }
 }

@@ -54,9 +54,11 @@ void apply(const Arguments& arguments, rig_file::RigFile& file) {
   if (arguments.has("backlash") && arguments.has("half-gap"))
     throw UsageError("--backlash and --half-gap say the same thing, give one of them");
   double& backlash = file.rig.mesh.backlash;
-  backlash = arguments.number("backlash", backlash, Range::not_negative());
-  if (arguments.has("half-gap")) backlash = 2 * arguments.number("half-gap", 0, Range::not_negative());
+  const double most = file.rig.mesh.most_backlash();
+  backlash = arguments.number("backlash", backlash, Range::between(0, most));
+  if (arguments.has("half-gap")) backlash = 2 * arguments.number("half-gap", 0, Range::between(0, most / 2));
   simulation::SensorsSettings& sensors = file.simulation.sensors;
+  sensors.seeded = sensors.seeded || arguments.has("seed");
   sensors.seed = arguments.integer("seed", sensors.seed, 0, std::numeric_limits<std::uint64_t>::max());
   sensors.sampling_rate = arguments.number("sample-rate", sensors.sampling_rate, Range::positive());
 }

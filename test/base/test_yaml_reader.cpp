@@ -12,6 +12,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/random.h"
+#include "backlash_diagnosis/base/yaml_problems.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
 
 namespace backlash {
@@ -228,6 +229,37 @@ TEST(YamlReader, FinishLooksIntoTheMapsThatWereRead) {
   EXPECT_EQ(message_of([&] { rig.finish(); }), "rig.yaml:7: terms[1].typo = 1: unknown key, known here: id");
   rig.maps("terms")[1].ignore("typo");
   EXPECT_NO_THROW(rig.finish());
+}
+
+TEST(YamlReader, AllMistakesAtOnceWhereTheyAreCollected) {
+  const auto read = [] {
+    const YamlReader yaml = YamlReader::from_text("a: 1\nb: x\nc: {d: -1, e: 2}\nf: [1, y]\n", "f.yaml");
+    EXPECT_EQ(yaml.number("a", Range::positive()), 1);
+    EXPECT_TRUE(Range::between(2, 3).contains(yaml.number("b", Range::between(2, 3))));
+    const YamlReader map = yaml.map("c");
+    EXPECT_GT(map.number("d", Range::positive()), 0);
+    yaml.numbers("f", Range::any());
+    yaml.map("g").map("h").number("i", Range::any());  // of what is missing nothing else is
+    yaml.finish();
+  };
+  YamlProblems problems;
+  problems.reading(read);
+  try {
+    problems.raise("f.yaml");
+    FAIL();
+  } catch (const BadData& error) {
+    EXPECT_STREQ(
+        error.what(),
+        "f.yaml: 5 mistakes\n  f.yaml:2: b = x: not a number, must be >= 2 and <= 3\n"
+        "  f.yaml:3: c.d = -1: must be > 0\n  f.yaml:4: f[1] = y: not a number\n"
+        "  f.yaml:1: g: is missing, expected a map\n  f.yaml:3: c.e = 2: unknown key, known here: d");
+  }
+  {
+    YamlProblems none;
+    none.raise("f.yaml");
+    EXPECT_EQ(YamlProblems::current(), &none);
+  }
+  EXPECT_EQ(YamlProblems::current(), &problems);
 }
 
 TEST(YamlReader, CopiesRememberTogetherAndOutliveTheFirst) {

@@ -12,6 +12,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/rig_file/declared_uncertainty.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
+#include "backlash_diagnosis/simulation/simulation.h"
 #include "support/data.h"
 
 namespace backlash::rig_file {
@@ -131,6 +132,36 @@ TEST(RigFile, MotorSideAxisScalesBaseRadiusAndDeflection) {
   EXPECT_NEAR(load_side.diagnosis.lost_motion->elastic_deflection(0.5), 0.5 / (1e7 * 0.02 * 0.02), 1e-15);
   EXPECT_NEAR(motor_side.diagnosis.lost_motion->elastic_deflection(0.5), 4 * 4 * 0.5 / (1e7 * 0.02 * 0.02),
               1e-15);
+}
+
+// Four mistakes in three parts of the file.
+TEST(RigFile, AllMistakesAtOnce) {
+  std::string text = replaced(kTwoInertias, "motor: {inertia: 1.0e-3}", "motor: {inertai: 1.0e-3}");
+  text = replaced(text, "damping: 10", "damping: ten");
+  text = replaced(text, "amplitude: 1", "amplitude: -1");
+  text = replaced(text, "torque: 0.5", "torque: 0");
+  try {
+    load(text);
+    FAIL();
+  } catch (const BadData& error) {
+    const std::string all = error.what();
+    for (const char* part : {"5 mistakes", ":6: gear_train.motor.inertia: is missing",
+                             ":6: gear_train.motor.inertai", ":8: gear_train.mesh.contact.damping = ten",
+                             ":11: excitation.amplitude = -1", ":14: diagnosis.lost_motion.torque = 0"})
+      EXPECT_NE(all.find(part), std::string::npos) << part << " in " << all;
+  }
+}
+
+// What only a simulation needs is asked for by the simulation.
+TEST(RigFile, ADiagnosisNeedsNeitherExcitationNorSeed) {
+  const std::string seedless = replaced(kTwoInertias, ", seed: 3", ", motor_torque: {noise: 1}");
+  EXPECT_TRUE(load(seedless).diagnosis.gap_traverse);
+  const RigFile noisy = load(seedless);
+  EXPECT_THROW(simulation::Simulation(noisy.rig, noisy.simulation), InvalidParameter);
+  std::string bare = replaced(kTwoInertias, "excitation: {type: sine, amplitude: 1, frequency: 2}\n", "");
+  EXPECT_THROW(simulation::Simulation(load(bare).rig, load(bare).simulation), InvalidParameter);
+  bare = replaced(bare, "sensors: {sampling_rate: 500, seed: 3}\n", "");
+  EXPECT_TRUE(load(bare).diagnosis.gap_traverse);
 }
 
 TEST(RigFile, DigestIsFnv1aOfTheText) {

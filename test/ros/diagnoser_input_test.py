@@ -132,7 +132,7 @@ class DiagnoserInputTest(unittest.TestCase):
     def test_nothing_received_is_said(self):
         answer = self.diagnoser.diagnose(periods=1, timeout=0.1)
         self.assertFalse(answer.success)
-        self.assertIn("only 0 of 1", answer.message)
+        self.assertIn("has named joint yet", answer.message)
         self.assertEqual(answer.verdict.grade, "cannot_tell")
 
     def test_other_excitation_is_out_of_domain_for_the_curve(self):

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <future>
 #include <mutex>
 #include <thread>
@@ -106,6 +107,53 @@ TEST_F(JointMonitorTest, ASlowJointDelaysNobody) {
   EXPECT_EQ(told.back(), stamp_of(record.time.back()));
   EXPECT_EQ(static_cast<long>(told.size()) + slow.state().replaced, periods);
   EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+}
+
+/// `first` s of one travel, then `second` s of another.
+record::Record changing(double first, double before, double second, double after) {
+  test::RecordRecipe recipe;
+  recipe.noise = 1e-3;
+  recipe.duration = first;
+  recipe.travel = before;
+  record::Record record = make_record(recipe);
+  recipe.duration = second;
+  recipe.travel = after;
+  recipe.start = first;
+  const record::Record more = make_record(recipe);
+  record.time.insert(record.time.end(), more.time.begin(), more.time.end());
+  for (const record::Channel channel : record::kChannels)
+    if (record.has(channel))
+      record.column(channel).insert(record.column(channel).end(), more.column(channel).begin(),
+                                    more.column(channel).end());
+  return record;
+}
+
+// A baseline is of one play; else it says when it became another.
+TEST_F(JointMonitorTest, SaysWhenThePlayChanged) {
+  JointMonitor one(monitor_settings("elbow"));
+  feed(one, changing(12, 0.0100, 3, 0.0104));  // 4 % are no change
+  EXPECT_EQ(one.change_of_play(), "");
+  JointMonitor two(monitor_settings("elbow"));
+  feed(two, changing(12, 0.0100, 3, 0.0050));
+  const std::string text = two.change_of_play();
+  // Stamps begin at 1e9 s, 2001-09-09T01:46:40Z; twelve stretches of 1.25 s, of which one holds both.
+  int from = 0, to = 0;
+  const char* const kFormat = "the play changed between 2001-09-09T01:46:%dZ and 2001-09-09T01:46:%dZ";
+  ASSERT_EQ(std::sscanf(text.c_str(), kFormat, &from, &to), 2) << text;
+  EXPECT_LE(from, 52);
+  EXPECT_GE(to + 1, 52);  // shown without its fraction
+  EXPECT_LE(to - from, 5);
+  EXPECT_NE(text.find("lost_motion"), std::string::npos) << text;
+}
+
+// No sample: at once, whatever the timeout.
+TEST_F(JointMonitorTest, NobodyWaitsForARobotThatIsNotThere) {
+  MonitorSettings settings = monitor_settings("elbow");
+  settings.silent = 0.2;
+  JointMonitor monitor(settings);
+  std::string note;
+  ros::Time stamp;
+  EXPECT_TRUE(monitor.diagnose(10, 1e6, note, stamp).estimates.empty());
 }
 
 // Services ask and settings change while samples come; the sanitizers watch.

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/random.h"
-#include "backlash_diagnosis/diagnosis/earlier_waveform.h"
+#include "backlash_diagnosis/diagnosis/earlier_answer.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/diagnosis/waveform.h"
 #include "backlash_diagnosis/model/contact_law.h"
@@ -230,14 +230,15 @@ TEST(Waveform, AnEarlierAnswerEndsWithTheMachineItIsOf) {
     rig_file::RigFile file = drawn(31, backlash);
     const record::Record all = simulation::simulate_record(file.rig, file.simulation, 5.2);
     const auto part = [&](double start) { return window_of(all.slice(start - 1e-6, start + 0.7 - 1e-6)); };
-    diagnosis::EarlierWaveform earlier;
+    diagnosis::EarlierAnswer earlier;
+    earlier.method = "waveform";
     earlier.end = 0.9;
     earlier.estimate.status = Status::ok;
     earlier.period = diagnosis::mean_period(part(0.2));
     const auto told = [&](diagnosis::PeriodWindow window) {
       window.record = without_position(window.record);
       diagnosis::Diagnosis now = diagnosis::diagnose(window, quick, nullptr);
-      diagnosis::recall_waveform(now, earlier, window, std::nullopt, std::nullopt);
+      diagnosis::recall(now, earlier, window, std::nullopt, std::nullopt);
       return now.estimates.back();
     };
     for (double start = 0.5; start < 4.5; start += 0.3)

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // day_report as a user calls it, on files as the monitors write them.
+#include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "backlash_diagnosis/base/utc.h"
 #include "backlash_diagnosis/diagnosis/change_log.h"
 #include "backlash_diagnosis/diagnosis/history.h"
 #include "tools/command_runner.h"
@@ -17,11 +19,11 @@ constexpr double kHour = 3600;
 class DayReport : public CommandTest {
  protected:
   /// Each hour of two days that end at noon; `play` in mrad, NaN: cannot tell.
-  void history(const std::string& joint, const std::string& grade, double play) {
+  void history(const std::string& joint, const std::string& grade, double play, double end = kNoon) {
     diagnosis::History file({path("history/" + joint + ".csv")});
     for (int hour = -48; hour <= 0; ++hour) {
       diagnosis::HistoryEntry e;
-      e.time = kNoon + hour * kHour;
+      e.time = end + hour * kHour;
       e.grade = grade;
       e.backlash_angle = 1e-3 * play, e.angle_lower = 0.9e-3 * play, e.angle_upper = 1.1e-3 * play;
       e.rig_digest = "0";
@@ -41,7 +43,7 @@ class DayReport : public CommandTest {
     diagnosis::append_change(path("history/" + joint + "_changes.csv"), c);
   }
 
-  Json day(int code, const std::string& more = "") {
+  Json day(int code, const std::string& more = "--until 2027-01-01T12:00:00Z") {
     const Outcome outcome = run("day_report history --out day.html --json day.json " + more);
     EXPECT_EQ(outcome.code, code) << outcome.err;
     return Json::parse(read("day.json"));
@@ -87,6 +89,23 @@ TEST_F(DayReport, AJointOfWhichNothingCanBeToldIsCounted) {
   const Json told = day(3);
   EXPECT_EQ(told["joints"][0]["told"], 0);
   expect_contains(told["summary"].get<std::string>(), "of 1 no estimate told the play");
+}
+
+/// A folder that nobody writes any more is not reported as today's.
+TEST_F(DayReport, SinceWhenNothingWasReported) {
+  const double now = double(std::time(nullptr));
+  history("elbow", "good", 0.5, now - 5 * kHour);
+  const Json all = day(3, "");
+  EXPECT_NEAR(all["joints"][0]["silent_since"].get<double>(), now - 5 * kHour, 1e-3);
+  const std::string text = "nothing since " + utc_time(now - 5 * kHour) + " (5.0 h): no diagnoser wrote";
+  expect_contains(all["summary"].get<std::string>(), text);
+  expect_contains(read("day.html"), text);
+  history("wrist", "good", 0.5, now);
+  const Json one = day(0, "");
+  expect_contains(one["joints"][0]["silence"].get<std::string>(), "no sample of this joint");
+  EXPECT_TRUE(one["joints"][1]["silent_since"].is_null());
+  // The same day, asked for by its end, ends there.
+  EXPECT_TRUE(day(0, "--until " + utc_time(now - 5 * kHour))["joints"][0]["silent_since"].is_null());
 }
 
 TEST_F(DayReport, WrongFoldersAndTimesAreRefused) {

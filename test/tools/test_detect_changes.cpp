@@ -3,6 +3,7 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <sstream>
 
 #include "support/data.h"
@@ -79,6 +80,21 @@ TEST_F(DetectChanges, TellsSinceWhenAJointOfTwoInertiasHasMorePlay) {
   const Json& angle = change["size"]["angle"];
   EXPECT_NEAR(angle["value"].get<double>(), 1.6e-4, 3 * angle["standard_error"].get<double>());
   EXPECT_GT(report["healthy_deflection_residual"], 0);
+}
+
+// Two tasks of a healthy joint, and the first of them again. What its model leaves where a move ends is at
+// the same place in both, so that it is no fault.
+TEST_F(DetectChanges, AHealthyTaskAgainDiffersByNothing) {
+  const std::string rig = package_file("config/simulated_robot/shoulder.yaml");
+  write("other.yaml",
+        std::regex_replace(read(rig), std::regex("positions: .*"), "positions: [-0.5, 0.4, 0.1]"));
+  done("simulate " + rig + " --duration 200 --seed 1 --out monday.csv");
+  done("simulate other.yaml --duration 200 --seed 2 --out tuesday.csv");
+  done("simulate " + rig + " --duration 200 --seed 11 --out today.csv");
+  done("detect_changes --rig " + rig + " --healthy monday.csv tuesday.csv --json out.json today.csv");
+  const Json report = Json::parse(read("out.json"));
+  EXPECT_TRUE(report["changes"].empty()) << report["changes"];
+  EXPECT_TRUE(report["different_from_beginning"].empty()) << report["different_from_beginning"];
 }
 
 // The forearm of an arm takes up half a kilogram while the gears of its elbow are found to have 5 % more

@@ -77,10 +77,11 @@ TEST_F(TrendCommand, JsonHasTheDocumentedKeys) {
   std::vector<std::string> keys;
   for (const auto& item : json.items()) keys.push_back(item.key());
   EXPECT_EQ(keys, (std::vector<std::string>{
-                      "schema_version", "version", "history",  "rig",     "rig_digest",    "quantity",
-                      "unit",           "limit",   "horizon",  "entries", "points",        "span",
-                      "known",          "grows",   "exceeded", "rate",    "rate_interval", "level",
-                      "time",           "date",    "reaches",  "message", "warnings",      "series"}));
+                      "schema_version", "version",       "history",      "rig",      "rig_digest",
+                      "quantity",       "unit",          "limit",        "horizon",  "entries",
+                      "points",         "span",          "known",        "grows",    "exceeded",
+                      "rate",           "rate_interval", "level",        "time",     "date",
+                      "reaches",        "message",       "silent_since", "warnings", "series"}));
   EXPECT_EQ(json["schema_version"], 1);
   EXPECT_EQ(json["points"], 40);
   // Four standard errors of a slope by least squares: 0.5 um sqrt(12) / (40^1.5 days) = 0.007 um per day.

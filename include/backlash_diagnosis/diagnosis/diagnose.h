@@ -38,6 +38,16 @@ struct DiagnosisSettings {
   std::optional<GapTraverseSettings> gap_traverse;
   std::string no_gap_traverse =  // the same
       "the rig has no free load behind rigid couplings and a linear mesh";
+  /// The same of gap_traverse.
+  void leave_out_gap_traverse(
+      const std::string& why = "takes a second: not run here, but by diagnose_record") {
+    gap_traverse.reset();
+    no_gap_traverse = why;
+  }
+  /// Whether the rig file declares what any estimator needs.
+  bool serves_any() const {
+    return apd || lost_motion || position_difference || momentum_transfer || waveform || gap_traverse;
+  }
   std::optional<CoherenceSettings> coherence;  // a detector beside the estimators
   std::optional<Limits> limits;
 };

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -77,5 +78,10 @@ struct HistoryFile {
 /// All parts of a history, the oldest first; also while it is written. Throws MissingInput, and BadData for a
 /// file that is no history.
 HistoryFile read_history(const std::string& path);
+
+/// s since 1970: the last entry, where it lies further before `end` than entries usually follow one another,
+/// by three times their median distance and by 600 s (a choice: ten of the default interval). None: it does
+/// not.
+std::optional<double> silent_since(const std::vector<HistoryEntry>& entries, double end);
 
 }  // namespace backlash::diagnosis

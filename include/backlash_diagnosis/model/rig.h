@@ -54,6 +54,8 @@ struct Mesh {
 
   bool angular() const { return std::isnan(base_radius); }
   double lever() const { return angular() ? 1 : base_radius; }  // m (or 1): torque per contact force
+  /// m (angular: rad), a whole turn: what is said to be so large is no play between teeth.
+  double most_backlash() const { return 2 * M_PI * lever(); }
   const ContactSpec& contact_spec() const;  // what `contact` was made of; empty without one
 };
 

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/rig_file/rig_document.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
 namespace backlash::rig_file {
@@ -27,5 +28,9 @@ void read_known_values(const YamlReader& yaml, RigFile& file);
 /// stays as it is. `source` says what they were identified from. Throws BadData, CannotIdentify.
 std::string commissioned_text(const RigFile& file, const diagnosis::WaveformCommissioning& found,
                               const std::string& source);
+
+/// Puts into a document of two inertias what its fit left of motor minus load position, rms beyond noise
+/// [rad]: GapTraverseSettings::unexplained. `source` says what it was identified from.
+void set_unexplained_deflection(RigDocument& document, double rms, const std::string& source);
 
 }  // namespace backlash::rig_file

@@ -5,6 +5,7 @@
 
 #include <ros/time.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -12,8 +13,9 @@
 #include <mutex>
 #include <optional>
 #include <thread>
+#include <vector>
 
-#include "backlash_diagnosis/diagnosis/earlier_waveform.h"
+#include "backlash_diagnosis/diagnosis/earlier_answer.h"
 
 namespace backlash::ros_bridge {
 
@@ -25,7 +27,7 @@ struct DiagnosisTask {
   diagnosis::DiagnosisSettings settings;
   std::shared_ptr<const diagnosis::MonitoringCurve> curve;  // null: none is there
   std::optional<diagnosis::Baseline> baseline;
-  std::optional<diagnosis::EarlierWaveform> fitted;  // latest
+  std::vector<diagnosis::EarlierAnswer> earlier;  // latest of the methods that the settings leave out
 
   diagnosis::Diagnosis compute() const;
 };
@@ -44,6 +46,8 @@ class DiagnosisWorker {
 
   void add(DiagnosisTask task);  ///< does not wait for work
   long replaced() const;         ///< tasks that were never worked on
+  /// Whether it has nothing to do, and has had for so many times as long as the latest task took.
+  bool rested(double times) const;
   void stop();  ///< waits for the present task and the latest that waits; then nothing is taken
 
  private:
@@ -54,6 +58,8 @@ class DiagnosisWorker {
   std::condition_variable changed_;
   std::deque<DiagnosisTask> waiting_;
   std::size_t samples_ = 0;  // of all that wait
+  bool working_ = false;
+  std::chrono::steady_clock::time_point began_, ended_;  // of the latest task
   long replaced_ = 0;
   bool stop_ = false;
   std::thread thread_;

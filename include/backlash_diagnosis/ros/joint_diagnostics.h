@@ -34,6 +34,11 @@ class JointDiagnostics {
   /// Looks at the joint; true where a level differs from that at the last call: to be published at once.
   bool update();
 
+  /// What the status `input` says now.
+  std::string input() const;
+  /// "no message for 12 s", where that is longer than `stale`; else empty.
+  std::string silence(const MonitorState& state) const;
+
  private:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
   using Describe = void (JointDiagnostics::*)(const MonitorState&, Status&);
@@ -51,7 +56,7 @@ class JointDiagnostics {
   void describe_curve(const MonitorState& state, Status& status);
   void look_at_recording();
   void add_history(Status& status) const;
-  void summarise_input(const MonitorState& state, double age, Status& status);
+  void summarise_input(const MonitorState& state, double age, Status& status) const;
 
   const JointMonitor& monitor_;
   const JointHistory* history_;
@@ -61,7 +66,7 @@ class JointDiagnostics {
   std::vector<record::Finding> found_;                   // in the newest samples
   double next_look_ = 0;                                 // s, of the steady clock
   long problems_ = 0, not_a_number_ = 0, replaced_ = 0;  // counted up to the last update
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
 };
 
 }  // namespace backlash::ros_bridge

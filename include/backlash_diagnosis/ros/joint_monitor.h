@@ -6,6 +6,7 @@
 
 #include <condition_variable>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "backlash_diagnosis/diagnosis/earlier_waveform.h"
+#include "backlash_diagnosis/diagnosis/earlier_answer.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/record/record_check.h"
 #include "backlash_diagnosis/ros/background_fits.h"
@@ -35,6 +36,7 @@ struct MonitorSettings {
   int window = 5;                   // periods that the running estimates look back
   double estimate_interval = 0.25;  // s of stamps at least from one running estimate to the next
   double keep = 60;                 // s of samples kept
+  double silent = 2;                // s of wall time without a sample, after which nobody waits for one
   double job_memory = kJobMemory;   // GB, of the process that builds a curve
 };
 
@@ -57,7 +59,8 @@ struct MonitorState {
   long replaced = 0;                            // running estimates left out, as they took too long
   bool any_sample = false;
   ros::WallTime last_arrival;
-  double latency = 0;  // s from stamp to arrival by ROS time, of the latest message
+  ros::WallTime last_estimate;  // when `latest` was there
+  double latency = 0;           // s from stamp to arrival by ROS time, of the latest message
   std::shared_ptr<const diagnosis::Diagnosis> latest;
   bool building_curve = false;
   bool baseline = false;
@@ -71,7 +74,8 @@ class JointMonitor {
   /// `stamp` is that of their last sample.
   using OnDiagnosis = std::function<void(const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis)>;
 
-  /// `fits` outlives the monitor; null: the estimator `waveform` is not run.
+  /// `fits` outlives the monitor; null: the methods that take seconds (`waveform`, `gap_traverse`) are in no
+  /// running estimate, and `waveform` in no answer.
   explicit JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis = nullptr,
                         BackgroundFits* fits = nullptr);
   ~JointMonitor();
@@ -81,8 +85,9 @@ class JointMonitor {
   const std::string& baseline_path() const { return settings_.baseline_path; }
 
   /// Takes what a message says of the joint, or what is wrong with it (see JointStateReader); a report when
-  /// it completes a period with an APD. Bad content is counted and told by state(). Where a running estimate
-  /// is due it copies the window; the rest of the work is not done here.
+  /// it completes a period with an APD. Bad content is counted and reported by state(). A running estimate is
+  /// due with such a period; without an APD as soon as the estimate before it has taken no more than a tenth
+  /// of the time since. Where one is due it copies the window; the rest of the work is not done here.
   std::optional<PeriodReport> take(const ros::Time& stamp, const record::ChannelValues& values,
                                    const std::string& problem, const std::string& topic);
 
@@ -90,9 +95,13 @@ class JointMonitor {
   record::RecordCheck check_recording(double seconds) const;
 
   /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s]
-  /// of wall time, then diagnoses the latest `periods` (0: all kept). `waveform` is what its latest fit
-  /// found; nobody waits for it.
+  /// of wall time and no longer than samples come, then diagnoses the latest `periods` (0: all kept).
+  /// `waveform` is what its latest fit found; nobody waits for it. No estimates where there is no sample at
+  /// all.
   diagnosis::Diagnosis diagnose(long periods, double timeout, std::string& note, ros::Time& stamp);
+
+  /// Whether all that is kept is of one play: empty, or since when it is another one, in words.
+  std::string change_of_play() const;
 
   /// Ends the running estimates: the latest that waits is still told.
   void stop() { worker_.stop(); }
@@ -102,6 +111,7 @@ class JointMonitor {
   void set_window(int periods, double estimate_interval);  ///< as in MonitorSettings
   void set_limits(const std::optional<diagnosis::Limits>& limits);
   std::optional<diagnosis::Limits> limits() const;
+  double estimate_interval() const;  ///< s, as in MonitorSettings
   std::optional<diagnosis::Baseline> baseline() const;
   std::shared_ptr<const diagnosis::MonitoringCurve> curve() const;
   MonitorState state() const;
@@ -112,7 +122,9 @@ class JointMonitor {
   std::optional<DiagnosisTask> due(double time);
   DiagnosisTask task(long periods) const;
   void work(const DiagnosisTask& task);
-  bool fit();
+  bool moment(const diagnosis::PeriodResult* period, double time) const;
+  bool fit(const std::string& method);
+  void background(const std::string& method);
   long wanted_periods(long periods) const { return periods > 0 ? periods : 1; }
 
   MonitorSettings settings_;
@@ -129,15 +141,15 @@ class JointMonitor {
   std::string curve_state_, last_problem_;
   std::string curve_warning_, baseline_warning_;
   long bad_messages_ = 0;
-  ros::WallTime last_arrival_;
+  ros::WallTime last_arrival_, last_sample_, last_estimate_;
   double latency_ = 0;
   bool building_ = false, build_tried_ = false, stop_ = false;
   std::thread builder_;
   OnDiagnosis on_diagnosis_;
   BackgroundFits* const fits_;
-  const std::optional<diagnosis::WaveformSettings> waveform_;  // absent: not run
-  std::optional<diagnosis::EarlierWaveform> fitted_;           // of this run of the stream
-  DiagnosisWorker worker_;                                     // last: it uses all of the others
+  const diagnosis::DiagnosisSettings all_methods_;
+  std::map<std::string, diagnosis::EarlierAnswer> fitted_;  // by method, of this run of the stream
+  DiagnosisWorker worker_;                                  // last: it uses all of the others
 };
 
 }  // namespace backlash::ros_bridge

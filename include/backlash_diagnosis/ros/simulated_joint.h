@@ -38,7 +38,7 @@ class SimulatedJoint : public SimulatedMachine {
   simulation::IntegratorStatistics statistics() const override { return simulation_.plant().statistics(); }
 
  private:
-  JointAccess access();
+  JointAccess access(const JointSettings& settings);
   bool set_rig(backlash_diagnosis::SetRig::Request& request, backlash_diagnosis::SetRig::Response& response);
 
   std::string name_, title_;

@@ -34,6 +34,7 @@ struct SensorSettings {
 struct SensorsSettings {
   double sampling_rate = 1000;  // Hz
   std::uint64_t seed = 1;
+  bool seeded = true;  // false: the rig file states no seed, and there is no noise without
   std::array<SensorSettings, record::kChannelCount> channels;  // indexed by Channel
 
   const SensorSettings& of(record::Channel channel) const {
@@ -46,6 +47,7 @@ SensorsSettings read_sensors(const YamlReader& yaml);
 
 class SensorModel {
  public:
+  /// Throws InvalidParameter for noise without a seed.
   explicit SensorModel(const SensorsSettings& settings);
 
   /// Starts the noise again from the seed.

@@ -49,8 +49,7 @@ ChangeWatchNode::ChangeWatchNode(const ros::NodeHandle& handle, const ros::NodeH
       inputs_(channels_of(settings.joints)),
       updater_(handle, private_handle) {
   for (const std::string& topic : inputs_.topics()) topics_.push_back(handle_.resolveName(topic));
-  const WatchSettings& first = settings.joints.front();
-  updater_.setHardwareID(first.arm ? first.arm->name : first.joint.rig.rig.name);
+  updater_.setHardwareID("none");  // each joint has its own
   for (const WatchSettings& joint : settings.joints) {
     for (std::size_t j = 0; j < joint.channels().size(); ++j) places_.push_back({joints_.size(), j});
     joints_.push_back(std::make_unique<JointWatch>(joint));
@@ -150,6 +149,8 @@ void ChangeWatchNode::publish(const std::vector<diagnosis::KnownChange>& news, c
 
 void ChangeWatchNode::describe(const JointWatch& joint, Status& status) const {
   const WatchState state = joint.state();
+  status.hardware_id =
+      joint.settings().arm ? joint.settings().arm->name : joint.settings().joint.rig.rig.name;
   const double silent = state.any_sample ? (ros::WallTime::now() - state.last_arrival).toSec() : 0;
   const std::string unseen = changes_in(diagnosis::ChangeState::unseen, state);
   if (const std::string changed = changes_in(diagnosis::ChangeState::standing, state); !changed.empty())

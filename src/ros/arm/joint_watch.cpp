@@ -281,7 +281,9 @@ WatchState JointWatch::state() const {
                                 rings_.front().length(), settings_.learn) +
                     (state.why_not.empty() ? "" : "; last: " + state.why_not);
   else if (state.why_not.empty() && state.judged == 0)
-    state.why_not = "nothing was looked at yet";
+    state.why_not =
+        fmt::format("nothing was looked at yet: {:.0f} s of samples so far, the first look needs {:.0f} s",
+                    rings_.front().length(), std::min(kLeastLook, kAll * settings_.window));
   return state;
 }
 

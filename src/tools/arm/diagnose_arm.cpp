@@ -17,7 +17,7 @@ int diagnose_arm(const Arguments& arguments, RecordDoor& door) {
       throw UsageError(std::string("--") + option +
                        " is for a record of one joint; this is the rig file of an arm");
   const std::string out = arguments.text("json"), rig = arguments.text("rig");
-  if (out != kStandardOutput) check_output(out, {arguments.positional(0), rig});
+  if (!out.empty() && out != kStandardOutput) check_output(out, {arguments.positional(0), rig});
   const geared_arm::GearedArm arm = geared_arm::load_geared_arm(rig);
   const arm::ArmRecord record = admitted_arm_record(arguments.positional(0), arm.rig, door);
   const arm_findings::ArmPlayReport report = arm_findings::arm_play_report(arm, record);
@@ -25,7 +25,7 @@ int diagnose_arm(const Arguments& arguments, RecordDoor& door) {
   if (out == kStandardOutput) {
     std::cout << json;
   } else {
-    write_text(out, json);
+    if (!out.empty()) write_text(out, json);
     arm_findings::print_arm_plays(report, std::cout);
   }
   // A fault that was found counts more than a joint that cannot be told.

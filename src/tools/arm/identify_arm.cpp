@@ -45,8 +45,8 @@ int identify_arm(const Arguments& arguments, RecordDoor& door) {
   arm::ArmFit fit = arm::fit_records(rig, records, {}, bar.progress(), carried);
   fit.warnings.insert(fit.warnings.end(), warnings.begin(), warnings.end());
   write_text(arguments.text("out"), arm_findings::fitted_arm_text(fit, arguments.positionals()));
-  write_text(arguments.text("json"), door.with_findings(arm_findings::arm_identification_json(
-                                         fit, arguments.text("rig"), arguments.positionals(), carried)));
+  write_text(json_beside_out(arguments), door.with_findings(arm_findings::arm_identification_json(
+                                             fit, arguments.text("rig"), arguments.positionals(), carried)));
   arm_findings::print_arm_summary(fit, arguments.positionals(), carried, std::cout);
   return fit.contradictions.empty() ? kHealthy : kInconclusive;
 }

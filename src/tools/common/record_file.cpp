@@ -126,4 +126,9 @@ void check_output(const std::string& path, const std::vector<std::string>& input
     fail(std::strerror(errno));
 }
 
+std::string json_beside_out(const Arguments& arguments) {
+  if (arguments.has("json")) return arguments.text("json");
+  return std::filesystem::path(arguments.text("out")).replace_extension(".json");
+}
+
 }  // namespace backlash::tools

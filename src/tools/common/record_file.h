@@ -48,4 +48,9 @@ inline const std::string kStandardOutput = "-";
 /// not exist or it is a folder itself.
 void check_output(const std::string& path, const std::vector<std::string>& inputs);
 
+class Arguments;
+
+/// Where the JSON of a command goes that writes --out: --json, else that file's name with .json.
+std::string json_beside_out(const Arguments& arguments);
+
 }  // namespace backlash::tools

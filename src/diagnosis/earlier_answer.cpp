@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/diagnosis/earlier_waveform.h"
+#include "backlash_diagnosis/diagnosis/earlier_answer.h"
 
 #include <fmt/core.h>
 
@@ -12,7 +12,6 @@
 namespace backlash::diagnosis {
 namespace {
 
-constexpr const char* kName = "waveform";
 constexpr double kOldest = 300;       // s: choice
 constexpr double kLeastMove = 0.02;   // of the value: choice
 constexpr double kFewestPeriods = 5;  // in all, of which errors can be told: choice
@@ -69,13 +68,13 @@ double distance(const MeanPeriod& a, const MeanPeriod& b) {
 }
 
 /// What shows that the machine is not what it was; empty: nothing.
-std::string changed_since(const EarlierWaveform& earlier, const Diagnosis& diagnosis,
+std::string changed_since(const EarlierAnswer& earlier, const Diagnosis& diagnosis,
                           const PeriodWindow& window) {
   const std::vector<Estimate>& now = diagnosis.estimates;
   for (const Estimate& e : now) {
     const auto then = std::find_if(earlier.others.begin(), earlier.others.end(),
                                    [&e](const Estimate& other) { return other.method == e.method; });
-    if (e.method == kName || then == earlier.others.end()) continue;
+    if (e.method == earlier.method || then == earlier.others.end()) continue;
     if (has_moved(*then, e)) return e.method;
     if (contradicts(e, earlier.estimate) && !contradicts(*then, earlier.estimate)) return e.method;
   }
@@ -87,10 +86,10 @@ std::string age_text(double age) {
 }
 
 /// The earlier answer, or why it does not hold now.
-Estimate recalled(const Diagnosis& diagnosis, const EarlierWaveform& earlier, const PeriodWindow& window) {
+Estimate recalled(const Diagnosis& diagnosis, const EarlierAnswer& earlier, const PeriodWindow& window) {
   const double age = window.record.time.back() - earlier.end;
   Estimate refused;
-  refused.method = kName;
+  refused.method = earlier.method;
   if (diagnosis.lock_contradicted) {
     refused.status = Status::out_of_domain;
     refused.message = *diagnosis.lock_contradicted;
@@ -133,22 +132,25 @@ MeanPeriod mean_period(const PeriodWindow& window) {
   return mean;
 }
 
-EarlierWaveform fit_waveform(const PeriodWindow& window, const DiagnosisSettings& settings,
-                             const MonitoringCurve* curve) {
-  EarlierWaveform earlier;
+EarlierAnswer answer_of(const std::string& method, const PeriodWindow& window,
+                        const DiagnosisSettings& settings, const MonitoringCurve* curve) {
+  EarlierAnswer earlier;
+  earlier.method = method;
   if (!window.record.time.empty()) earlier.end = window.record.time.back();
-  earlier.estimate = diagnose(window, settings, curve, std::nullopt, kName).estimates.front();
+  earlier.estimate = diagnose(window, settings, curve, std::nullopt, method).estimates.front();
   DiagnosisSettings quick = settings;
   quick.leave_out_waveform();
+  quick.leave_out_gap_traverse();
   earlier.others = diagnose(window, quick, curve).estimates;
   earlier.period = mean_period(window);
   return earlier;
 }
 
-void recall_waveform(Diagnosis& diagnosis, const EarlierWaveform& earlier, const PeriodWindow& window,
-                     const std::optional<Limits>& limits, const std::optional<Baseline>& baseline) {
-  const auto place = std::find_if(diagnosis.estimates.begin(), diagnosis.estimates.end(),
-                                  [](const Estimate& estimate) { return estimate.method == kName; });
+void recall(Diagnosis& diagnosis, const EarlierAnswer& earlier, const PeriodWindow& window,
+            const std::optional<Limits>& limits, const std::optional<Baseline>& baseline) {
+  const auto place =
+      std::find_if(diagnosis.estimates.begin(), diagnosis.estimates.end(),
+                   [&earlier](const Estimate& estimate) { return estimate.method == earlier.method; });
   if (place == diagnosis.estimates.end() || window.record.time.empty()) return;
   *place = recalled(diagnosis, earlier, window);
   doubt_declared_values(diagnosis.estimates);
@@ -156,7 +158,7 @@ void recall_waveform(Diagnosis& diagnosis, const EarlierWaveform& earlier, const
   const auto index = static_cast<int>(place - diagnosis.estimates.begin());
   const std::vector<int>& members = diagnosis.verdict.members;
   if (std::find(members.begin(), members.end(), index) != members.end())
-    diagnosis.verdict.message += fmt::format("; {} is {}", kName, age_text(place->age));
+    diagnosis.verdict.message += fmt::format("; {} is {}", earlier.method, age_text(place->age));
 }
 
 }  // namespace backlash::diagnosis

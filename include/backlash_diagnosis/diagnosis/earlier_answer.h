@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// An answer of `waveform`, which takes seconds, beside a diagnosis of later samples of the same machine.
+// An answer of a method that takes seconds (`waveform`, `gap_traverse`), beside a diagnosis of later samples
+// of the same machine.
 #pragma once
 
 #include <optional>
@@ -18,8 +19,9 @@ struct MeanPeriod {
 };
 MeanPeriod mean_period(const PeriodWindow& window);
 
-/// What `waveform` found on samples that ended at `end`, and what the other methods found on the same.
-struct EarlierWaveform {
+/// What a method found on samples that ended at `end`, and what the quick methods found on the same.
+struct EarlierAnswer {
+  std::string method;
   double end = 0;  ///< s, on the clock of the samples
   Estimate estimate;
   std::vector<Estimate> others;
@@ -27,11 +29,11 @@ struct EarlierWaveform {
 };
 
 /// Both on the same samples. Throws as diagnose() does.
-EarlierWaveform fit_waveform(const PeriodWindow& window, const DiagnosisSettings& settings,
-                             const MonitoringCurve* curve);
+EarlierAnswer answer_of(const std::string& method, const PeriodWindow& window,
+                        const DiagnosisSettings& settings, const MonitoringCurve* curve);
 
-/// Puts the earlier answer into a diagnosis of a window, without `waveform`, and combines anew. Its age is
-/// told, in Estimate::age and in the messages. It is not used, and the reason is told, where
+/// Puts the earlier answer into a diagnosis of a window that left its method out, and combines anew. Its age
+/// is reported, in Estimate::age and in the messages. It is not used, and the reason is reported, where
 ///   - it is older than 300 s: a choice, as play grows by months;
 ///   - the machine has changed since: another method has moved by more than both its intervals (without what
 ///     they have of declared values, which is the same in both, and not below a fiftieth of the value), or
@@ -39,7 +41,7 @@ EarlierWaveform fit_waveform(const PeriodWindow& window, const DiagnosisSettings
 ///     more than two standard errors, as a mean over the period, of which a hundredth of the swing is no
 ///     change;
 ///   - the samples of now contradict the declared lock.
-void recall_waveform(Diagnosis& diagnosis, const EarlierWaveform& earlier, const PeriodWindow& window,
-                     const std::optional<Limits>& limits, const std::optional<Baseline>& baseline);
+void recall(Diagnosis& diagnosis, const EarlierAnswer& earlier, const PeriodWindow& window,
+            const std::optional<Limits>& limits, const std::optional<Baseline>& baseline);
 
 }  // namespace backlash::diagnosis

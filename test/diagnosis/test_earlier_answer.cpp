@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/diagnosis/earlier_waveform.h"
+#include "backlash_diagnosis/diagnosis/earlier_answer.h"
 
 namespace backlash::diagnosis {
 namespace {
@@ -24,8 +24,9 @@ Estimate made(const std::string& method, double value, double half, Status statu
 }
 
 /// Of samples that ended at 100 s.
-EarlierWaveform earlier(const std::vector<Estimate>& others) {
-  EarlierWaveform found;
+EarlierAnswer earlier(const std::vector<Estimate>& others) {
+  EarlierAnswer found;
+  found.method = "waveform";
   found.end = 100;
   found.estimate = made("waveform", 80e-6, 0.6e-6);
   found.estimate.from_record = found.estimate.fits_machine = true;
@@ -42,11 +43,11 @@ PeriodWindow ended(double when) {
 }
 
 /// What is told at 102.5 s, or when said.
-Diagnosis told(const EarlierWaveform& found, const std::vector<Estimate>& now, double when = 102.5) {
+Diagnosis told(const EarlierAnswer& found, const std::vector<Estimate>& now, double when = 102.5) {
   Diagnosis diagnosis;
   diagnosis.estimates = now;
   diagnosis.estimates.push_back(made("waveform", 0, 0, Status::insufficient_data));
-  recall_waveform(diagnosis, found, ended(when), std::nullopt, std::nullopt);
+  recall(diagnosis, found, ended(when), std::nullopt, std::nullopt);
   return diagnosis;
 }
 
@@ -54,7 +55,7 @@ bool counts(const Diagnosis& d) {
   return d.estimates.back().status == Status::ok;
 }
 
-TEST(EarlierWaveform, CountsWithItsAgeTold) {
+TEST(EarlierAnswer, CountsWithItsAgeTold) {
   const Diagnosis d = told(earlier({made("lost_motion", 79e-6, 5e-6)}), {made("lost_motion", 82e-6, 5e-6)});
   const Estimate& e = d.estimates.back();
   EXPECT_EQ(e.status, Status::ok);
@@ -66,7 +67,7 @@ TEST(EarlierWaveform, CountsWithItsAgeTold) {
 }
 
 // 79 -> 95 um with 5 um of scatter in each: the machine changed. With wide intervals of declared values, too.
-TEST(EarlierWaveform, AMovedMethodShowsAChange) {
+TEST(EarlierAnswer, AMovedMethodShowsAChange) {
   EXPECT_FALSE(counts(told(earlier({made("a", 79e-6, 5e-6)}), {made("a", 95e-6, 5e-6)})));
   EXPECT_TRUE(counts(told(earlier({made("a", 79e-6, 9e-6)}), {made("a", 95e-6, 9e-6)})));
   Estimate then = made("a", 79e-6, 25e-6), now = made("a", 95e-6, 25e-6);
@@ -80,7 +81,7 @@ TEST(EarlierWaveform, AMovedMethodShowsAChange) {
   EXPECT_TRUE(counts(told(earlier({made("a", 80e-6, 1e-8)}), {made("a", 81e-6, 1e-8)})));
 }
 
-TEST(EarlierWaveform, AContradictionCountsWhereThereWasNone) {
+TEST(EarlierAnswer, AContradictionCountsWhereThereWasNone) {
   const Estimate mute = made("a", 0, 0, Status::ambiguous), far = made("a", 150e-6, 20e-6);
   EXPECT_FALSE(counts(told(earlier({mute}), {far})));
   EXPECT_TRUE(counts(told(earlier({far}), {far})));  // as it was: combine() settles it
@@ -91,19 +92,19 @@ TEST(EarlierWaveform, AContradictionCountsWhereThereWasNone) {
   EXPECT_FALSE(counts(told(earlier({mute}), {bound})));
 }
 
-TEST(EarlierWaveform, NeitherTooOldNorWithoutTheLock) {
+TEST(EarlierAnswer, NeitherTooOldNorWithoutTheLock) {
   EXPECT_TRUE(counts(told(earlier({}), {}, 399)));
   EXPECT_FALSE(counts(told(earlier({}), {}, 401)));
   Diagnosis diagnosis;
   diagnosis.lock_contradicted = "the output turns";
   diagnosis.estimates = {made("waveform", 0, 0, Status::insufficient_data)};
-  recall_waveform(diagnosis, earlier({}), ended(101), std::nullopt, std::nullopt);
+  recall(diagnosis, earlier({}), ended(101), std::nullopt, std::nullopt);
   EXPECT_EQ(diagnosis.estimates.back().status, Status::out_of_domain);
   EXPECT_EQ(diagnosis.estimates.back().message, "the output turns");
 }
 
 // A fit that ended after the samples that are diagnosed now: what waits in a queue.
-TEST(EarlierWaveform, NoAgeBelowZero) {
+TEST(EarlierAnswer, NoAgeBelowZero) {
   EXPECT_EQ(told(earlier({}), {}, 99).estimates.back().age, 0);
 }
 
