@@ -93,7 +93,7 @@ class Solver {
     for (int c = 0; c < channels(); ++c) lacking |= misfit(fit, c).left() > kLacking[c] * swing_[c];
     for (int k = kHalfGap + 1; k < kSharedValues; ++k) lacking |= std::fabs(fit.fit.shared[k]) > kBentTo;
     if (lacking) fit = with_what_it_lacks(fit);
-    WaveformSolution s = told(fit);
+    WaveformSolution s = solution(fit);
     s.lacking = lacking;
     return s;
   }
@@ -301,7 +301,7 @@ class Solver {
   }
 
   /// With the values' deviations from what is declared, their common factor within them.
-  WaveformSolution told(const Fitted& f) const {
+  WaveformSolution solution(const Fitted& f) const {
     WaveformSolution s;
     s.priors = f.windows->priors();
     s.half_gap = f.value(kHalfGap);

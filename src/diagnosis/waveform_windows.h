@@ -23,7 +23,7 @@ struct WaveformCut {
   double ring = 0;          ///< s, cycle of the motor against the pinion: sets the scale of all times
   int most = 0;             ///< windows, spread evenly over the record
   bool free = false;        ///< the link is, so that a smooth torque turns on the teeth at another time
-  double from = 0, to = 0;  ///< s, within which windows lie; the rest tells when a square wave reverses
+  double from = 0, to = 0;  ///< s, within which windows lie; the rest shows when a square wave reverses
 };
 
 /// A window that lacks half of its samples is left out. Throws Refusal where the samples are too few.
