@@ -211,7 +211,7 @@ def traces(axes, rest, window, channel, data, scale):
     """One window of the fit: what was measured, the machine's waveform over it, and below what is left."""
     trace = window[channel]
     measured, model = (np.array(trace[key], float) / scale for key in ("measured", "model"))
-    time = 1e3 * data.waveform["interval"] * np.arange(measured.size)
+    time = 1e3 * np.array(window["times"], float)
     axes.plot(time, measured, ".", color=MEASURED, markersize=2.5, label="measured")
     axes.plot(time, model, color=BAD, linewidth=0.9, label="fitted machine")
     noise = data.waveform[channel + "_noise"] / scale

@@ -34,11 +34,11 @@ WaveformSettings after(const WaveformSettings& before, const WaveformSolution& s
   Eigen::MatrixXd c(count, count);
   Eigen::VectorXd u(count);
   for (int i = 0; i < count; ++i) {
-    u[i] = s.priors[static_cast<std::size_t>(of_fit(i))].power;
+    u[i] = s.priors.powers[static_cast<std::size_t>(of_fit(i))];
     for (int j = 0; j < count; ++j) {
       const int a = of_fit(i), b = of_fit(j);
-      c(i, j) = s.covariance(a, b) * s.priors[static_cast<std::size_t>(a)].spread *
-                s.priors[static_cast<std::size_t>(b)].spread;
+      c(i, j) = s.covariance(a, b) * s.priors.shared[static_cast<std::size_t>(a)].spread *
+                s.priors.shared[static_cast<std::size_t>(b)].spread;
     }
   }
   const Eigen::VectorXd unit = c.diagonal().cwiseSqrt();
@@ -53,7 +53,7 @@ WaveformSettings after(const WaveformSettings& before, const WaveformSolution& s
   machine.common_scale = std::sqrt(common);
   for (int i = 0; i < count; ++i) {
     const auto k = static_cast<std::size_t>(of_fit(i));
-    const WaveformPrior& prior = s.priors[k];
+    const fit::Prior& prior = s.priors.shared[k];
     const double finest = prior.factor ? kFinest : kFinest * s.values[k];
     const double spread = std::min(prior.spread, std::max(finest, widest * own[i] * unit[i]));
     const WaveformQuantity& q = waveform_quantities()[places[static_cast<std::size_t>(i)]];
@@ -124,8 +124,9 @@ WaveformCommissioning commission_waveform(const std::vector<record::Record>& rec
     try {
       check_waveform(record, result.machine);
       const bool first = result.states.empty();
-      const WaveformSolution s =
-          solve_waveform(record, result.machine, first ? told / 2 : kNaN, first ? told_error : kNaN);
+      WaveformTask task;
+      if (first) task.half_gap = told / 2, task.log_error = told_error;
+      const WaveformSolution s = solve_waveform(record, result.machine, task);
       refuse_waveform(s);
       for (std::size_t i = 0; i < places.size(); ++i)
         left[i] *= s.told[static_cast<std::size_t>(kQuantityPlaces[places[i]])];

@@ -13,6 +13,11 @@ namespace {
 
 using Lanes = double __attribute__((vector_size(8 * kWaveformSets)));
 
+constexpr double kClosing = 1e-3;      // m/s, within which hysteresis of the teeth turns: choice
+constexpr double kLeastDepth = 1e-6;   // of the usual penetration, that a power is taken of
+constexpr double kStribeckSpeeds = 3;  // speeds of dry friction, at which its excess has fallen: choice
+constexpr double kFast = 60;           // e^-60 is none
+
 DIAGNOSIS_LANES Lanes positive(const Lanes& a) {
   return a > 0 ? a : Lanes{};
 }
@@ -40,11 +45,12 @@ DIAGNOSIS_LANES Lanes per_inertia(const Lanes& v) {
 /// By what power of their penetration the teeth resist.
 enum class Teeth { line, power, hertz };
 
-template <Teeth Law>
+template <Teeth Law, bool Lacking>
 struct Train {
   Lanes half_gap, motor_damping, dry, slow, ki, ci, per_jm, per_jp, per_jg, ko, co, contact, loss, slope;
   Lanes per_jl, link_damping, link_dry, contact_damping;
-  double lever, exponent;
+  Lanes stribeck, load_friction, drag, pinion_dry, beyond, hysteresis;
+  double lever, exponent, usual_depth;
   WaveformOutput behind;
 
   DIAGNOSIS_LANES explicit Train(const Lanes* v, const WaveformGrid& grid)
@@ -66,16 +72,32 @@ struct Train {
         link_damping(v[kLinkDamping]),
         link_dry(positive(v[kLinkFriction])),
         contact_damping(v[kContactDamping]),
+        stribeck(v[kStribeck]),
+        load_friction(v[kLoadFriction]),
+        drag(v[kDrag]),
+        pinion_dry(positive(v[kPinionFriction])),
+        beyond(v[kTeethExponent]),
+        hysteresis(v[kTeethHysteresis]),
         lever(grid.base_radius),
         exponent(grid.exponent),
+        usual_depth(grid.usual_depth),
         behind(grid.output) {}
 
   /// At penetration `depth` [m], approaching at `rate` [m/s]: N, no tension.
   DIAGNOSIS_LANES Lanes push(const Lanes& depth, const Lanes& rate) const {
-    if constexpr (Law == Teeth::hertz) return contact * depth * root(depth) * positive(1 + loss * rate);
+    Lanes times = 1 + loss * rate;
+    if constexpr (Lacking) times += hysteresis * rate / (magnitude(rate) + kClosing);
+    if constexpr (Law == Teeth::hertz) return contact * depth * root(depth) * shape(depth) * positive(times);
     const Lanes spring = Law == Teeth::line ? contact * depth : contact * lanes_power(depth, exponent);
-    const Lanes force = positive(spring * (1 + loss * rate) + contact_damping * rate);
+    const Lanes force = positive(spring * shape(depth) * times + contact_damping * rate);
     return depth > 0 ? force : Lanes{};
+  }
+
+  /// Of teeth of another exponent.
+  DIAGNOSIS_LANES Lanes shape(const Lanes& depth) const {
+    if constexpr (!Lacking) return Lanes{} + 1;
+    const Lanes x = depth / usual_depth, safe = x > kLeastDepth ? x : Lanes{} + kLeastDepth;
+    return lanes_exp(Lanes(beyond * lanes_log(safe)));
   }
 
   /// Penetration of one set at rest, m, and its stiffness there, N m/rad.
@@ -110,7 +132,9 @@ struct Train {
     const Lanes teeth = x < 0 ? -pushed : pushed;
     const Lanes sensor = ki * (s.qm - s.qp) + ci * (s.wm - s.wp);
     State rate{};
-    rate.qm = s.wm, rate.wm = (drive + slope * s.qm - motor_damping * s.wm - sensor) * per_jm;
+    Lanes damping = motor_damping;
+    if constexpr (Lacking) damping += drag * magnitude(s.wm);
+    rate.qm = s.wm, rate.wm = (drive + slope * s.qm - damping * s.wm - sensor) * per_jm;
     rate.qp = s.wp, rate.wp = (sensor - teeth) * per_jp;
     rate.qg = s.wg;
     output(s, teeth, rate);
@@ -130,7 +154,14 @@ struct Train {
     const State a = rate(s, drive), b = rate(along(s, a, h / 2), drive);
     const State c = rate(along(s, b, h / 2), drive), d = rate(along(s, c, h), drive);
     s = along(along(along(along(s, a, h / 6), b, h / 3), c, h / 3), d, h / 6);
-    brake(dry * per_jm * h, h, s.qm, s.wm);
+    Lanes friction = dry;
+    if constexpr (Lacking) {
+      const Lanes x = s.wm / (kStribeckSpeeds * slow), square = x * x < kFast ? x * x : Lanes{} + kFast;
+      friction = positive(dry + stribeck * lanes_exp(Lanes(-square)) +
+                          load_friction * magnitude(ki * (s.qm - s.qp)));
+      brake(pinion_dry * per_jp * h, h, s.qp, s.wp);
+    }
+    brake(friction * per_jm * h, h, s.qm, s.wm);
     if (behind == WaveformOutput::link) brake(link_dry * per_jl * h, h, s.qg, s.wg);
     if (behind == WaveformOutput::coupled_link) brake(link_dry * per_jl * h, h, s.ql, s.wl);
   }
@@ -147,8 +178,8 @@ struct Train {
 
 /// 5 ms before a reversal nothing else moves: the gear of a locked output follows the pinion on its flank; a
 /// free link is driven by it.
-template <Teeth Law>
-DIAGNOSIS_LANES State start(const Train<Law>& train, const WaveformWindow& window, const Lanes* v) {
+template <typename Train>
+DIAGNOSIS_LANES State start(const Train& train, const WaveformWindow& window, const Lanes* v) {
   const Lanes load = positive(v[kStartFlank]);
   Lanes depth = {}, share = {};
   for (int i = 0; i < kWaveformSets; ++i) {
@@ -178,113 +209,142 @@ DIAGNOSIS_LANES void put(const Lanes& from, std::array<double, kWaveformSets>& t
   std::memcpy(to.data(), &from, sizeof from);
 }
 
-/// Torque `lag` ago, by the cubic through values and rates at either end of a step of the integration
-/// (Hermite). Between samples it would miss some per cent of the ring.
-double lagged(const WaveformRows& torque, const WaveformRows& rate, int step, std::size_t set, double lag,
-              double interval) {
-  const double x = step - lag / interval;
-  const int last = static_cast<int>(torque.size()) - 2;
-  const int k = std::clamp(static_cast<int>(std::floor(x)), 0, last);
-  const std::size_t i = static_cast<std::size_t>(k);
-  const double u = x - k, p = torque[i][set], q = torque[i + 1][set];
-  const double r = rate[i][set] * interval, s = rate[i + 1][set] * interval;
-  if (u < 0) return p + u * r;
-  if (u > 1) return q + (u - 1) * s;
-  return p + u * (r + u * (3 * (q - p) - 2 * r - s + u * (2 * (p - q) + r + s)));
-}
+/// A signal at the ends of the steps, with its rate.
+struct Path {
+  WaveformRows value, rate;
+  void resize(std::size_t count) { value.resize(count), rate.resize(count); }
+  DIAGNOSIS_LANES void set(std::size_t k, const Lanes& v, const Lanes& r) {
+    put(v, value[k]), put(r, rate[k]);
+  }
 
-/// Torque of the motor over one step, N m.
+  /// After x steps, by the cubic through values and rates at either end (Hermite); beyond the ends straight
+  /// on. Lines would miss some per cent of the ring.
+  double at(double x, double step, std::size_t set) const {
+    const int last = static_cast<int>(value.size()) - 2;
+    const int k = std::clamp(static_cast<int>(std::floor(x)), 0, last);
+    const auto i = static_cast<std::size_t>(k);
+    const double u = x - k, p = value[i][set], q = value[i + 1][set];
+    const double r = rate[i][set] * step, s = rate[i + 1][set] * step;
+    if (u < 0) return p + u * r;
+    if (u > 1) return q + (u - 1) * s;
+    return p + u * (r + u * (3 * (q - p) - 2 * r - s + u * (2 * (p - q) + r + s)));
+  }
+};
+
+/// Torque of the motor over steps one after the other, N m.
 class Drive {
  public:
-  DIAGNOSIS_LANES Drive(const WaveformWindow& window, const WaveformGrid& grid, const Lanes& delay)
-      : window_(window), grid_(grid), delay_(delay), change_(window.reversal + delay) {}
+  DIAGNOSIS_LANES Drive(const WaveformWindow& window, double step, const Lanes* v)
+      : window_(window),
+        step_(step),
+        delay_(v[kSwitchDelay] + v[kStartSwitch]),
+        change_(window.reversal + delay_),
+        follow_(step / (step + positive(v[kSwitchTime]))),
+        now_(Lanes{} + window.before) {}
 
-  DIAGNOSIS_LANES Lanes at(std::size_t sample, int j) const {
-    const double h = grid_.interval / grid_.steps;
+  DIAGNOSIS_LANES Lanes next(std::size_t k) {
+    const double begin = static_cast<double>(k) * step_;
     if (window_.drive.empty()) {
-      const Lanes part = (change_ - (static_cast<double>(sample) * grid_.interval + j * h)) / h;
+      const Lanes part = (change_ - begin) / step_;
       const Lanes share = part < 0 ? Lanes{} : part > 1 ? Lanes{} + 1 : part;  // of it before the reversal
-      return share * window_.before + (1 - share) * window_.after;
+      now_ += follow_ * (share * window_.before + (1 - share) * window_.after - now_);
+      return now_;
     }
-    const double here = window_.drive[sample], next = window_.drive[sample + 1];
-    return here + ((j + 0.5) * h - delay_) / grid_.interval * (next - here);
+    const double middle = begin + 0.5 * step_;
+    while (sample_ + 2 < window_.at.size() && window_.at[sample_ + 1] <= middle) ++sample_;
+    const double here = window_.drive[sample_], from = window_.at[sample_];
+    const double slope = (window_.drive[sample_ + 1] - here) / (window_.at[sample_ + 1] - from);
+    return here + (middle - from - delay_) * slope;
   }
 
  private:
   const WaveformWindow& window_;
-  const WaveformGrid& grid_;
-  Lanes delay_, change_;
+  double step_;
+  std::size_t sample_ = 0;
+  Lanes delay_, change_, follow_, now_;
 };
 
-template <Teeth Law>
-DIAGNOSIS_LANES void move_all(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+template <Teeth Law, bool Lacking>
+DIAGNOSIS_LANES void move_all(const WaveformWindow& window, const WaveformGrid& grid, std::size_t samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
   Lanes v[kAllValues];
   for (std::size_t k = 0; k < kAllValues; ++k)
     for (std::size_t i = 0; i < kWaveformSets; ++i) v[k][static_cast<int>(i)] = sets[k][i];
-  const Train<Law> train(v, grid);
+  const Train<Law, Lacking> train(v, grid);
   State s = start(train, window, v);
-  const double h = grid.interval / grid.steps;
-  const Drive drive(window, grid, v[kSwitchDelay]);
-  const Lanes zero = v[kPositionZero] + v[kStartZero];
-  const auto count = static_cast<std::size_t>(samples);
-  static thread_local WaveformRows torque, rate;
-  const auto steps = static_cast<std::size_t>(grid.steps), all = (count - 1) * steps + 1;
-  torque.resize(all), rate.resize(all);
-  motion.torque.resize(count), motion.position.resize(count);
+  const double whole = window.at[samples - 1];
+  const auto steps = static_cast<std::size_t>(std::ceil(whole / grid.step));
+  const double h = whole / static_cast<double>(steps);
+  Drive drive(window, h, v);
+  static thread_local Path torque, position;
+  torque.resize(steps + 1), position.resize(steps + 1);
   const Lanes damper = grid.sensor_with_damper ? train.ci : Lanes{};
   const Lanes follow = h / (h + positive(v[kSensorTime]));  // of a step, by the sensor: implicit Euler
+  const Lanes curve = v[kSensorCurve] / grid.level;
   Lanes shown = train.ki * (s.qm - s.qp) + damper * (s.wm - s.wp), shown_rate = train.ki * (s.wm - s.wp);
-  for (std::size_t k = 0; k < count; ++k) {
-    put(s.qm + zero, motion.position[k]);
-    for (std::size_t j = 0; j < steps; ++j) {
-      put(v[kSensorGain] * shown + v[kSensorBias], torque[k * steps + j]);
-      put(v[kSensorGain] * shown_rate, rate[k * steps + j]);
-      if (k + 1 == count) break;
-      train.step(drive.at(k, static_cast<int>(j)) + v[kDriveOffset], h, s);
-      shown += follow * (train.ki * (s.qm - s.qp) + damper * (s.wm - s.wp) - shown);
-      shown_rate += follow * (train.ki * (s.wm - s.wp) - shown_rate);
-    }
+  for (std::size_t k = 0; k <= steps; ++k) {
+    position.set(k, s.qm, s.wm);
+    const Lanes bent = curve * magnitude(shown);
+    torque.set(k, v[kSensorGain] * shown * (1 + bent) + v[kSensorBias],
+               v[kSensorGain] * shown_rate * (1 + 2 * bent));
+    if (k == steps) break;
+    train.step(drive.next(k) + v[kDriveOffset], h, s);
+    shown += follow * (train.ki * (s.qm - s.qp) + damper * (s.wm - s.wp) - shown);
+    shown_rate += follow * (train.ki * (s.wm - s.wp) - shown_rate);
   }
-  for (std::size_t k = 0; k < count; ++k)
-    for (std::size_t i = 0; i < kWaveformSets; ++i)
-      motion.torque[k][i] = lagged(torque, rate, static_cast<int>(k * steps), i, sets[kSensorLag][i], h);
+  motion.torque.resize(samples), motion.position.resize(samples);
+  for (std::size_t k = 0; k < samples; ++k)
+    for (std::size_t i = 0; i < kWaveformSets; ++i) {
+      motion.torque[k][i] = torque.at((window.at[k] - sets[kSensorLag][i]) / h, h, i);
+      motion.position[k][i] =
+          position.at(window.at[k] / h, h, i) + sets[kPositionZero][i] + sets[kStartZero][i];
+    }
 }
 
-DIAGNOSIS_LANES void move_any(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+template <bool Lacking>
+DIAGNOSIS_LANES void move_any(const WaveformWindow& window, const WaveformGrid& grid, std::size_t samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
-  if (grid.exponent == kHertzExponent) return move_all<Teeth::hertz>(window, grid, samples, sets, motion);
-  if (grid.exponent == 1) return move_all<Teeth::line>(window, grid, samples, sets, motion);
-  move_all<Teeth::power>(window, grid, samples, sets, motion);
+  if (grid.exponent == kHertzExponent)
+    return move_all<Teeth::hertz, Lacking>(window, grid, samples, sets, motion);
+  if (grid.exponent == 1) return move_all<Teeth::line, Lacking>(window, grid, samples, sets, motion);
+  move_all<Teeth::power, Lacking>(window, grid, samples, sets, motion);
+}
+
+DIAGNOSIS_LANES void move_either(const WaveformWindow& window, const WaveformGrid& grid, std::size_t samples,
+                                 bool lacking, const WaveformSets& sets, WaveformMotion& motion) {
+  if (lacking)
+    move_any<true>(window, grid, samples, sets, motion);
+  else
+    move_any<false>(window, grid, samples, sets, motion);
 }
 
 #if defined(__x86_64__)
 __attribute__((target("avx512f,prefer-vector-width=512"))) void move_avx512(const WaveformWindow& window,
                                                                             const WaveformGrid& grid,
-                                                                            int samples,
+                                                                            std::size_t samples, bool lacking,
                                                                             const WaveformSets& sets,
                                                                             WaveformMotion& motion) {
-  move_any(window, grid, samples, sets, motion);
+  move_either(window, grid, samples, lacking, sets, motion);
 }
 
 __attribute__((target("avx2"))) void move_avx2(const WaveformWindow& window, const WaveformGrid& grid,
-                                               int samples, const WaveformSets& sets,
+                                               std::size_t samples, bool lacking, const WaveformSets& sets,
                                                WaveformMotion& motion) {
-  move_any(window, grid, samples, sets, motion);
+  move_either(window, grid, samples, lacking, sets, motion);
 }
 #endif
 
 }  // namespace
 
-void move_waveform(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+void move_waveform(const WaveformWindow& window, const WaveformGrid& grid, std::size_t samples, bool lacking,
                    const WaveformSets& sets, WaveformMotion& motion) {
 #if defined(__x86_64__)
   static const bool has_avx512 = __builtin_cpu_supports("avx512f");
   static const bool has_avx2 = __builtin_cpu_supports("avx2");
-  if (has_avx512) return move_avx512(window, grid, samples, sets, motion);
-  if (has_avx2) return move_avx2(window, grid, samples, sets, motion);
+  if (has_avx512) return move_avx512(window, grid, samples, lacking, sets, motion);
+  if (has_avx2) return move_avx2(window, grid, samples, lacking, sets, motion);
 #endif
-  move_any(window, grid, samples, sets, motion);
+  move_either(window, grid, samples, lacking, sets, motion);
 }
 
 }  // namespace backlash::diagnosis

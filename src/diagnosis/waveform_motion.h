@@ -6,12 +6,21 @@
 //   Jp qp'' = T - F rb                       T = Ki (qm - qp) + Ci (qm' - qp')
 //   Jg qg'' = F rb - Ko qg - Co qg'          F = K d^1.5 max(0, 1 + 3/2 alpha d'),  d = |rb (qp - qg)| - gap
 //
-// with a free link instead of the locked output as in waveform.h.
+// with a free link instead of the locked output as in waveform.h. What a rig file may lack comes in beside
+// it (theory of each: model/terms): motor friction that falls with speed and grows with T, quadratic drag,
+// dry friction of the pinion, teeth of another exponent and with hysteresis,
+//
+//   dry -> max(0, dry + s exp(-(qm' / (3 friction_speed))^2) + l |T|),  cm -> cm + q |qm'|
+//   F -> F (d / d0)^e,  1 + 3/2 alpha d' -> 1 + 3/2 alpha d' + h d' / (|d'| + 1 mm/s)
+//
+// with d0 the penetration under the usual torque.
 //
 // F has the sign of qp - qg (Hunt and Crossley 1975; Sarkar, Ellis and Moore 1997, Eqs. 8 to 12). `offset`
-// and `slope` stand for cogging and gravity within the small travel. The sensors:
+// and `slope` stand for cogging and gravity within the small travel. A square wave turns with a first-order
+// lag. The sensors:
 //
-//   torque = gain Ki (qm - qp) + bias, a first-order lag and a delay later        position = qm + zero
+//   torque = gain S (1 + curve |S| / level) + bias, S = Ki (qm - qp) a first-order lag and a delay later
+//   position = qm + zero
 //
 // A free link has no place of its own: each window has its zero, and the gear is at 0 when it starts.
 //
@@ -20,6 +29,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "backlash_diagnosis/diagnosis/waveform.h"
@@ -50,9 +60,18 @@ enum WaveformValue {
   kSensorLag,         // s
   kSensorTime,        // s, time constant of a first-order lag besides, < 0 counts as 0
   kSwitchDelay,       // s, by which the torque switches later than the window says
+  kSwitchTime,        // s, time constant of a square wave, < 0 counts as 0
   kDriveOffset,       // N m
   kDriveSlope,        // N m/rad
   kPositionZero,      // rad
+  // What a rig file may lack.
+  kStribeck,         // s, N m
+  kLoadFriction,     // l, -
+  kDrag,             // q, N m s^2/rad^2
+  kPinionFriction,   // N m, < 0 counts as 0
+  kTeethExponent,    // e, -
+  kTeethHysteresis,  // h, -
+  kSensorCurve,      // -
   kGlobalValues,
   kStartTwist = kGlobalValues,  // N m: Ki (qm - qp), towards the flank that is loaded
   kStartFlank,                  // N m: torque on that flank; < 0: off it by -kStartFlank / Ki
@@ -60,6 +79,7 @@ enum WaveformValue {
   kStartPinionRate,             // N m per ms: Ki qp'
   kStartGearRate,               // N m per ms: Ki (qg' - qp'), of a free link
   kStartZero,                   // rad: of the position, of a free link
+  kStartSwitch,                 // s, by which the torque switches later in this window
   kAllValues,
   kStartValues = kAllValues - kGlobalValues
 };
@@ -67,21 +87,26 @@ enum WaveformValue {
 constexpr double kHertzExponent = 1.5;      // exponent of the contact that takes the least time
 constexpr double kWaveformRateTime = 1e-3;  // s, of the start values that are rates: choice
 constexpr int kWaveformSets = 8;  // moved at once: two registers of AVX2, so that their waits overlap
+/// Name of a value for messages.
+const char* waveform_value_name(int which);
 using WaveformSets = std::array<std::array<double, kWaveformSets>, kAllValues>;
 
-/// A stretch of evenly spaced samples about one reversal.
+/// A stretch of samples about one reversal, which starts at the first of them.
 struct WaveformWindow {
   double side = 1;               // sign of the torque before the reversal
   double before = 0, after = 0;  // N m, torque of the motor
   double reversal = 0;           // s after the first sample
-  int first = 0, samples = 0;    // in the record
+  double unsure = 0;             // s, standard deviation of that
+  std::size_t first = 0;         // sample of the record
+  std::vector<double> at;        // s, of each sample after the first
   std::vector<double> drive;     // N m, torque of the motor at each sample; none: a step from before to after
 };
 
 struct WaveformGrid {
-  double interval = 0;              // s, between samples
-  int steps = 1;                    // of the integration per sample
+  double step = 0;                  // s, of the integration, at most
   double base_radius = 0;           // m
+  double level = 1;                 // N m, usual torque
+  double usual_depth = 1;           // m, penetration of the declared teeth under it
   bool sensor_with_damper = false;  // the sensor shows T and not the spring's share
   WaveformOutput output = WaveformOutput::locked;
   double exponent = kHertzExponent;  // of the contact
@@ -93,8 +118,9 @@ struct WaveformMotion {
   WaveformRows torque, position;
 };
 
-/// `motion` keeps its memory from call to call.
-void move_waveform(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+/// Of the first `samples` of a window. `lacking`: some set has a value of what a rig file may lack. `motion`
+/// keeps its memory from call to call.
+void move_waveform(const WaveformWindow& window, const WaveformGrid& grid, std::size_t samples, bool lacking,
                    const WaveformSets& sets, WaveformMotion& motion);
 
 }  // namespace backlash::diagnosis

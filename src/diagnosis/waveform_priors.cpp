@@ -16,32 +16,48 @@ constexpr double kStepPerImpact = 0.3;  // step times frequency of the teeth
 constexpr double kImpact = 3;           // times the level, torque of an impact
 constexpr double kStiffer = 3;          // output and contact may be so much stiffer than declared
 constexpr double kWideGap = 3;          // spread of the logarithm of the gap: next to nothing is known
+constexpr double kGapStep = 3e-4;       // of the logarithm, about its standard error, of a difference
+constexpr double kLeastStep = 1e-4;     // the same of values that are known better than a tenth
+constexpr double kCurrentLoop = 3e-4;   // s, of a current loop
+// What a rig file may lack. Spreads are what such machines have.
+constexpr double kDragSpeed = 10;            // rad/s
+constexpr double kForeignPinion = 0.02;      // of the level
+constexpr double kForeignExponent = 0.1;     // Hertz's 1.5 against what measured teeth have, 1.1 to 1.6
+constexpr double kForeignHysteresis = 0.05;  // steel teeth lose some per cent
+constexpr double kForeignCurve = 0.01;       // of a strain gauge's gain from nothing to the level
 
 double friction_spread(double declared, const WaveformData& data) {
   return std::isnan(declared) ? WaveformSpread::kDryFriction * data.level : declared;
 }
 
-/// Powers in the factor of the symmetry. Theory.
-void put_powers(const WaveformSettings& s, WaveformPriors& p) {
-  p[kHalfGap].power = -1;
-  for (std::size_t i = 0; i < waveform_quantities().size(); ++i)
-    p[static_cast<std::size_t>(kQuantityPlaces[i])].power = scale_power(waveform_quantities()[i], s);
+/// What the machine has not is 0 and stays there.
+void put(WaveformPriors& p, int k, double value, double spread, bool factor) {
+  const bool has = !std::isnan(value);
+  fit::Prior& prior = p.shared[std::size_t(k)];
+  prior = {waveform_value_name(k), has ? value : 0, has ? spread : 0, has && factor};
+  if (prior.factor && prior.spread > 0) prior.step = std::max(prior.step, kLeastStep / prior.spread);
 }
 
-/// Of contact and output: what the machine has not is 0 and stays there.
 void put_what_it_has(const WaveformSettings& s, const WaveformData& data, WaveformPriors& p) {
-  const auto put = [&p](int k, double value, double spread, bool factor) {
-    const bool has = !std::isnan(value);
-    p[static_cast<std::size_t>(k)] = {has ? value : 0, has ? spread : 1, has && factor, has};
-  };
-  put(kContactLoss, s.contact_loss, s.spread.contact_loss, true);
-  put(kContactDamping, s.contact_damping, s.spread.contact_damping, true);
-  put(kGearInertia, s.gear_inertia, s.spread.gear_inertia, true);
-  put(kOutputStiffness, s.output_stiffness, s.spread.output_stiffness, true);
-  put(kOutputDamping, s.output_damping, s.spread.output_damping, true);
-  put(kLinkInertia, s.link_inertia, s.spread.link_inertia, true);
-  put(kLinkDamping, s.link_damping, s.spread.link_damping, true);
-  put(kLinkFriction, s.link_friction, friction_spread(s.spread.link_friction, data), false);
+  put(p, kContactLoss, s.contact_loss, s.spread.contact_loss, true);
+  put(p, kContactDamping, s.contact_damping, s.spread.contact_damping, true);
+  put(p, kGearInertia, s.gear_inertia, s.spread.gear_inertia, true);
+  put(p, kOutputStiffness, s.output_stiffness, s.spread.output_stiffness, true);
+  put(p, kOutputDamping, s.output_damping, s.spread.output_damping, true);
+  put(p, kLinkInertia, s.link_inertia, s.spread.link_inertia, true);
+  put(p, kLinkDamping, s.link_damping, s.spread.link_damping, true);
+  put(p, kLinkFriction, s.link_friction, friction_spread(s.spread.link_friction, data), false);
+}
+
+void put_what_it_lacks(const WaveformData& data, bool lacking, WaveformPriors& p) {
+  const double times = lacking ? 1 : 0;
+  put(p, kStribeck, 0, times * kForeignTorque * data.level, false);
+  put(p, kLoadFriction, 0, times * kForeignTorque, false);
+  put(p, kDrag, 0, times * kForeignTorque * data.level / (kDragSpeed * kDragSpeed), false);
+  put(p, kPinionFriction, 0, times * kForeignPinion * data.level, false);
+  put(p, kTeethExponent, 0, times * kForeignExponent, false);
+  put(p, kTeethHysteresis, 0, times * kForeignHysteresis, false);
+  put(p, kSensorCurve, 0, times * kForeignCurve, false);
 }
 
 }  // namespace
@@ -62,7 +78,7 @@ double step_of_teeth(const WaveformSettings& s, double level) {
   return kStepPerImpact / (s.base_radius * std::sqrt(stiffness * (1 / s.pinion_inertia + 1 / gear)));
 }
 
-WaveformGrid waveform_grid(const WaveformSettings& s, double interval, double level) {
+WaveformGrid waveform_grid(const WaveformSettings& s, double level) {
   double step = waveform_ring(s) / kStepsPerRing;
   if (s.contact_exponent < kHertzExponent) step = std::min(step, step_of_teeth(s, level));
   if (s.output != WaveformOutput::link) {
@@ -70,62 +86,74 @@ WaveformGrid waveform_grid(const WaveformSettings& s, double interval, double le
     step = std::min(
         step, kStepPerTime / std::sqrt(kStiffer * s.output_stiffness * (1 / s.gear_inertia + per_link)));
   }
-  return {interval,      static_cast<int>(std::ceil(interval / step - 1e-6)),
-          s.base_radius, s.sensor_with_damper,
-          s.output,      s.contact_exponent};
+  const double usual = std::pow(level / s.base_radius / s.contact_stiffness, 1 / s.contact_exponent);
+  return {step, s.base_radius, level, usual, s.sensor_with_damper, s.output, s.contact_exponent};
 }
 
 double waveform_swing(const std::vector<double>& values) {
   return values.empty() ? 1 : signal::quantile_range(values, 0.001) / 2;
 }
 
-double waveform_position_swing(const WaveformData& data) {
-  if (data.grid.output == WaveformOutput::locked || data.position.empty())
-    return waveform_swing(data.position);
+double waveform_position_swing(const WaveformData& data, bool locked) {
+  if (locked || data.position.empty()) return waveform_swing(data.position);
   std::vector<double> all;
   for (const WaveformWindow& w : data.windows) {
-    const auto first = data.position.begin() + w.first;
-    const auto [least, most] = std::minmax_element(first, first + w.samples);
+    const auto first = data.position.begin() + static_cast<std::ptrdiff_t>(w.first);
+    const auto [least, most] = std::minmax_element(first, first + static_cast<std::ptrdiff_t>(w.at.size()));
     all.push_back((*most - *least) / 2);
   }
   return signal::median(all);
 }
 
-WaveformPriors waveform_priors(const WaveformSettings& s, const WaveformData& data) {
+double WaveformPriors::common(int k) const {
+  const double spread = shared[std::size_t(k)].spread;
+  return spread > 0 ? shared[kCommonScale].spread * powers[std::size_t(k)] / spread : 0;
+}
+
+double WaveformPriors::value(int k, const Eigen::Ref<const Eigen::VectorXd>& z) const {
+  return shared[std::size_t(k)].value(z[k] + (k == kHalfGap ? 0 : common(k) * z[kCommonScale]));
+}
+
+WaveformPriors waveform_priors(const WaveformSettings& s, const WaveformData& data, bool lacking) {
   using Spread = WaveformSpread;
-  const bool moves = s.output != WaveformOutput::locked;
-  const double position = data.position.empty() ? 1 : waveform_swing(data.position);
-  const double middle = data.position.empty() ? 0 : signal::median(data.position);
-  WaveformPriors p;
-  p[kHalfGap] = {waveform_twist(s, data.level), kWideGap, true};
-  p[kMotorDamping] = {s.motor_damping, s.spread.motor_damping, true};
-  p[kDryFriction] = {s.dry_friction, friction_spread(s.spread.dry_friction, data)};
-  p[kFrictionSpeed] = {s.friction_speed, s.spread.friction_speed, true};
-  p[kSensorStiffness] = {s.sensor_stiffness, s.spread.sensor_stiffness, true};
-  p[kSensorDamping] = {s.sensor_damping, s.spread.sensor_damping, true};
-  p[kMotorInertia] = {s.motor_inertia, s.spread.motor_inertia, true};
-  p[kPinionInertia] = {s.pinion_inertia, s.spread.pinion_inertia, true};
+  const bool moves = s.output != WaveformOutput::locked, seen = !data.position.empty();
+  WaveformPriors p{fit::Priors(kSharedValues), std::vector<double>(kSharedValues, 0)};
+  put(p, kHalfGap, waveform_twist(s, data.level), kWideGap, true);
+  p.shared[kHalfGap].step = kGapStep / kWideGap;
+  put(p, kMotorDamping, s.motor_damping, s.spread.motor_damping, true);
+  put(p, kDryFriction, s.dry_friction, friction_spread(s.spread.dry_friction, data), false);
+  put(p, kFrictionSpeed, s.friction_speed, s.spread.friction_speed, true);
+  put(p, kSensorStiffness, s.sensor_stiffness, s.spread.sensor_stiffness, true);
+  put(p, kSensorDamping, s.sensor_damping, s.spread.sensor_damping, true);
+  put(p, kMotorInertia, s.motor_inertia, s.spread.motor_inertia, true);
+  put(p, kPinionInertia, s.pinion_inertia, s.spread.pinion_inertia, true);
   put_what_it_has(s, data, p);
-  p[kContactStiffness] = {s.contact_stiffness, s.spread.contact_stiffness, true};
-  p[kSensorGain] = {s.sensor_gain, s.spread.sensor_gain, true};
-  p[kSensorBias] = {0, Spread::kBias * data.level};
-  p[kSensorLag] = {s.sensor_delay, s.spread.sensor_delay};
-  p[kSensorTime] = {s.sensor_time_constant, s.spread.sensor_time_constant};
-  p[kSwitchDelay] = {0, data.grid.interval / 2};  // theory: it is seen a sample late at most
-  p[kDriveOffset] = {0, Spread::kDrive * data.level};
-  p[kDriveSlope] = {0, Spread::kDriveSlope * s.sensor_stiffness, false, !moves};
-  p[kPositionZero] = {moves ? 0 : middle, position, false, !moves && !data.position.empty()};
-  put_powers(s, p);
+  put(p, kContactStiffness, s.contact_stiffness, s.spread.contact_stiffness, true);
+  put(p, kSensorGain, s.sensor_gain, s.spread.sensor_gain, true);
+  put(p, kSensorBias, 0, Spread::kBias * data.level, false);
+  put(p, kSensorLag, s.sensor_delay, s.spread.sensor_delay, false);
+  put(p, kSensorTime, s.sensor_time_constant, s.spread.sensor_time_constant, false);
+  put(p, kSwitchDelay, 0, data.square ? std::hypot(data.interval / 2, kCurrentLoop) : data.interval / 2,
+      false);
+  put(p, kSwitchTime, 0, data.square ? kCurrentLoop : 0, false);
+  put(p, kDriveOffset, 0, Spread::kDrive * data.level, false);
+  put(p, kDriveSlope, 0, moves ? 0 : Spread::kDriveSlope * data.level, false);
+  put(p, kPositionZero, seen && !moves ? signal::median(data.position) : 0,
+      seen && !moves ? waveform_swing(data.position) : 0, false);
+  put_what_it_lacks(data, lacking, p);
+  p.shared[kCommonScale] = {"common scale", 1, s.common_scale, true};
+  p.powers[kHalfGap] = -1;
+  for (std::size_t i = 0; i < waveform_quantities().size(); ++i)
+    p.powers[static_cast<std::size_t>(kQuantityPlaces[i])] = scale_power(waveform_quantities()[i], s);
   return p;
 }
 
-double waveform_symmetry_error(const WaveformPriors& priors, double common) {
-  Eigen::VectorXd w = Eigen::VectorXd::Zero(kGlobalValues);
-  for (int k = 0; k < kGlobalValues; ++k) {
-    const WaveformPrior& prior = priors[static_cast<std::size_t>(k)];
-    w[k] = prior.power / prior.spread;
-  }
-  return 1 / std::sqrt(w.dot(waveform_precision(priors, common) * w));
+double waveform_symmetry_error(const WaveformPriors& priors) {
+  double information = 0;
+  for (int k = 0; k < kGlobalValues; ++k)
+    if (const double spread = priors.shared[std::size_t(k)].spread; spread > 0)
+      information += std::pow(priors.powers[std::size_t(k)] / spread, 2);
+  return std::hypot(1 / std::sqrt(information), priors.shared[kCommonScale].spread);
 }
 
 }  // namespace backlash::diagnosis

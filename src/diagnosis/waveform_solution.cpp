@@ -6,18 +6,22 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
+#include <optional>
 #include <utility>
 
+#include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
-#include "waveform_priors.h"
-#include "waveform_start.h"
-#include "waveform_windows.h"
 
 namespace backlash::diagnosis {
 namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 // All choices, tried on simulated machines, but where another origin is given.
 constexpr int kMostWindows = 12;       // beyond them the errors do not shrink: priors and equations limit
@@ -27,151 +31,195 @@ constexpr double kModelError = 0.002;  // of the swing: no model is better
 constexpr double kGuesses[] = {0.1, 0.3, 0.8, 2,
                                4.5};  // half gaps per twist of the sensor, along the line of action
 constexpr double kFirstLoss = 0.2;    // spreads, of what cannot be below 0: from there its slope is not seen
-constexpr double kHopeless = 4;       // times the noise, or this share of the swing: far from any fit
-constexpr double kHopelessSwing = 0.02;
+constexpr double kHopeless = 0.08;    // of the swing, left of the torque early on: far from any fit
 constexpr double kFreeLink =
     1.8;  // errors of a free link: simulation, some windows settle beside their best start
 // Of a sampled torque that drives, per level: beyond it an answer was wrong and sure. What it leaves of the
 // swing of each channel. Simulation.
 constexpr double kMostDriveNoise = 0.03;
 constexpr double kDriveNoise[kWaveformChannels] = {1, 0.4};
-constexpr double kLatest = 3;   // spreads, of the delay of the sensor
-constexpr double kSure = 3;     // standard deviations of the correlation of white noise
-constexpr double kLeftOut = 4;  // times the median misfit of the windows
-constexpr double kLeftOutFree[kWaveformChannels] = {2, 9};  // of a free link, whose windows start anyhow
+constexpr double kSure = 3;       // standard deviations of the correlation of white noise
+constexpr double kLeftOut = 0.5;  // weight of a window that is said to be left out
+constexpr double kSame = 0.05;    // of the logarithm of two gaps that are one
+// Of the swing, what is left beyond noise where the machine is fitted with what a rig file may lack.
+constexpr double kLacking[kWaveformChannels] = {0.01, 0.0006};
+
+constexpr double kBentTo = 3;  // or spreads of a value, which has been bent to hold something else: theory
 
 /// How far a stage looks, in cycles of the ring, and how much of the swing it takes as noise.
 struct Look {
   double rings, noise;
   int iterations;
-  bool central;
 };
-constexpr Look kSearch[] = {{3, 0.1, 6, false}, {3, 0.03, 6, false}, {5, 0.03, 5, false}};
-constexpr Look kMiddle[] = {{8, 0.01, 8, false}, {12, 0.004, 8, true}};
-constexpr Look kLast = {12, 0, 15, true};
+constexpr Look kSearch[] = {{3, 0.1, 6}, {3, 0.03, 6}, {5, 0.03, 5}};
+constexpr Look kMiddle[] = {{8, 0.01, 8}, {12, 0.004, 8}};
+constexpr Look kLast = {12, 0, 15};
+
+/// A machine fitted to some windows.
+struct Fitted {
+  std::unique_ptr<WaveformResiduals> windows;
+  fit::WindowedFit fit;
+
+  Fitted(const WaveformData& data, const WaveformSettings& settings, const WaveformPriors& priors,
+         std::vector<std::size_t> chosen)
+      : windows(std::make_unique<WaveformResiduals>(data, settings, priors, std::move(chosen))),
+        fit(*windows) {}
+
+  double value(int k) const { return windows->priors().value(k, fit.shared); }
+
+  /// rms in noises of a channel of a window.
+  double rms(int w, int channel) const {
+    const VectorXd& r = fit.residual(w);
+    const Index rows = r.size() / windows->channels();
+    return std::sqrt(r.segment(channel * rows, rows).squaredNorm() / double(rows));
+  }
+};
 
 class Solver {
  public:
-  Solver(const record::EvenGrid& even, const WaveformSettings& settings, double told, double told_error,
-         const std::vector<double>& places)
-      : settings_(settings), ring_(waveform_ring(settings)), told_gap_(told), told_error_(told_error) {
-    const bool free = settings.output != WaveformOutput::locked;
-    const record::Record& record = even.record;
-    data_.windows = waveform_windows(even, ring_, kMostWindows, free, places);
-    data_.lost = even.lost;
-    data_.torque = record.column(record::Channel::sensor_torque);
-    data_.position = record.column(record::Channel::motor_position);
-    time_ = record.time;
-    for (const WaveformWindow& w : data_.windows)
-      data_.level +=
-          (std::fabs(w.before) + std::fabs(w.after)) / 2 / static_cast<double>(data_.windows.size());
-    data_.grid = waveform_grid(settings, record.sampling_interval(), data_.level);
-    data_.unseen = unseen_samples();
+  Solver(const record::Record& record, const WaveformSettings& settings, const WaveformTask& task)
+      : settings_(settings), task_(task) {
+    const bool locked = settings.output == WaveformOutput::locked;
+    data_ = waveform_data(record, {waveform_ring(settings), kMostWindows, !locked, task.from, task.to});
     swing_[kTorqueChannel] = waveform_swing(data_.torque);
-    swing_[kPositionChannel] = waveform_position_swing(data_);
-    data_.guesses = waveform_starts(data_, settings);
-    data_.starts = waveform_start_count(data_, settings);
-    drive_noise_ = drive_noise(record);
-    for (double& noise : noise_) noise = 0;
-    used_.assign(data_.windows.size(), true);
+    swing_[kPositionChannel] = waveform_position_swing(data_, locked);
+    drive_noise_ = drive_noise();
+    for (int c = 0; c < channels(); ++c) signal_noise_[c] = signal_noise(WaveformChannel(c));
   }
 
   WaveformSolution solve() {
-    WaveformPriors priors = waveform_priors(settings_, data_);
-    if (!std::isnan(told_gap_)) priors[kHalfGap] = {told_gap_, told_error_, true};
-    WaveformFit fit = searched(priors);
-    for (const Look& look : kMiddle) {
-      fit.run(stage(look, search_set()));
-      measure_noise(fit, search_set());
-    }
-    refuse_early();
-    for (const Look& look : kSearch) fit.run(starts_of_the_others(look));
-    fit.run(stage(kMiddle[1], used_));
-    leave_out(fit);
-    measure_noise(fit, used_);
-    fit.run(stage(kLast, used_));
-    leave_out(fit);
-    measure_noise(fit, used_);
-    fit.run(stage(kLast, used_));
-    return told(fit, priors);
+    Fitted fit = fitted(searched(priors(false)));
+    bool lacking = false;
+    for (int c = 0; c < channels(); ++c) lacking |= misfit(fit, c).left() > kLacking[c] * swing_[c];
+    for (int k = kHalfGap + 1; k < kSharedValues; ++k) lacking |= std::fabs(fit.fit.shared[k]) > kBentTo;
+    if (lacking) fit = with_what_it_lacks(fit);
+    WaveformSolution s = solution(fit);
+    s.lacking = lacking;
+    return s;
   }
 
  private:
-  /// At the start of a window: what a late sensor shows there was before it.
-  int unseen_samples() const {
-    const double latest = settings_.sensor_delay + kLatest * settings_.spread.sensor_delay;
-    return std::min(static_cast<int>(std::ceil(latest / data_.grid.interval)),
-                    waveform_lead(ring_, data_.grid.interval) / 2);
+  int channels() const { return data_.position.empty() ? 1 : 2; }
+
+  WaveformPriors priors(bool lacking) const {
+    WaveformPriors p = waveform_priors(settings_, data_, lacking);
+    if (fit::Prior& gap = p.shared[kHalfGap]; !std::isnan(task_.half_gap)) {
+      gap.step *= gap.spread / task_.log_error;
+      gap.centre = task_.half_gap, gap.spread = task_.log_error;
+    }
+    return p;
   }
 
-  std::vector<bool> search_set() const {
-    std::vector<bool> set(data_.windows.size(), false);
-    const std::size_t pairs = set.size() / 2, take = std::min<std::size_t>(pairs, kSearchWindows / 2);
-    for (std::size_t i = 0; i < take; ++i) set[i * pairs / take * 2] = set[i * pairs / take * 2 + 1] = true;
-    return set;
+  std::vector<std::size_t> all_windows() const {
+    std::vector<std::size_t> all(data_.windows.size());
+    std::iota(all.begin(), all.end(), 0);
+    return all;
   }
 
-  WaveformFit::Stage stage(const Look& look, const std::vector<bool>& set) const {
-    WaveformFit::Stage stage;
-    for (std::size_t w = 0; w < set.size(); ++w)
-      stage.lengths.push_back(
-          set[w] ? waveform_length(data_.windows[w], look.rings, ring_, data_.grid.interval) : 0);
+  std::vector<std::size_t> search_windows() const {
+    std::vector<std::size_t> some;
+    const std::size_t pairs = data_.windows.size() / 2,
+                      take = std::min<std::size_t>(pairs, kSearchWindows / 2);
+    for (std::size_t i = 0; i < take; ++i)
+      some.push_back(i * pairs / take * 2), some.push_back(i * pairs / take * 2 + 1);
+    return some;
+  }
+
+  void run(Fitted& f, const Look& look) const {
+    f.windows->rings = look.rings;
     for (int c = 0; c < kWaveformChannels; ++c)
-      stage.noise[c] = std::hypot(std::max(noise_[c], kModelError * swing_[c]), look.noise * swing_[c]);
-    stage.iterations = look.iterations;
-    stage.central = look.central;
-    stage.coarse = look.noise >= kCoarse;
-    return stage;
+      f.windows->noise[c] = std::hypot(std::max(noise_[c], kModelError * swing_[c]), look.noise * swing_[c]);
+    f.windows->coarse = look.noise >= kCoarse;
+    fit::FitOptions options;
+    options.iterations = look.iterations;
+    options.central = look.noise == 0;
+    f.fit.run(options);
   }
 
-  WaveformFit::Stage starts_of_the_others(const Look& look) const {
-    std::vector<bool> set = search_set();
-    set.flip();
-    WaveformFit::Stage only = stage(look, set);
-    only.starts_only = true;
-    return only;
+  /// Middle one of the windows.
+  void measure_noise(const Fitted& f) {
+    for (int c = 0; c < channels(); ++c) {
+      std::vector<double> rms;
+      for (int w = 0; w < f.windows->count(); ++w) rms.push_back(f.rms(w, c) * f.windows->noise[c]);
+      noise_[c] = signal::median(rms);
+    }
   }
 
-  /// The best of several guesses of the gap.
-  WaveformFit searched(const WaveformPriors& priors) {
-    std::vector<WaveformFit> fits;
-    std::vector<double> costs;
+  /// The best of several guesses of the gap, on some windows.
+  Fitted searched(const WaveformPriors& priors) {
+    const bool known = !std::isnan(task_.half_gap);
+    const fit::Prior& gap = priors.shared[kHalfGap];
+    std::vector<Fitted> fits;
     for (const double guess : kGuesses) {
-      fits.emplace_back(data_, priors, settings_.common_scale);
-      const WaveformPrior& gap = priors[kHalfGap];
-      const bool known = !std::isnan(told_gap_);
-      fits.back().point.z[kHalfGap] =
-          known ? 0 : std::log(guess * waveform_twist(settings_, data_.level) / gap.value) / gap.spread;
-      if (settings_.dry_friction == 0) fits.back().point.z[kDryFriction] = kFirstLoss;
-      if (settings_.link_friction == 0) fits.back().point.z[kLinkFriction] = kFirstLoss;
-      if (settings_.sensor_time_constant == 0) fits.back().point.z[kSensorTime] = kFirstLoss;
-      double cost = 0;
-      for (const Look& look : kSearch) cost = fits.back().run(stage(look, search_set()));
-      costs.push_back(cost);
+      fits.emplace_back(data_, settings_, priors, search_windows());
+      VectorXd& z = fits.back().fit.shared;
+      z[kHalfGap] =
+          known ? 0 : std::log(guess * waveform_twist(settings_, data_.level) / gap.centre) / gap.spread;
+      for (const int k : {kDryFriction, kLinkFriction, kSensorTime})
+        if (priors.shared[std::size_t(k)].spread > 0 && priors.shared[std::size_t(k)].centre == 0)
+          z[k] = kFirstLoss;
       if (known) break;
     }
-    std::vector<std::size_t> order(costs.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return costs[a] < costs[b]; });
-    WaveformFit& best = fits[order[0]];
-    for (const std::size_t i : order) {  // the best that went elsewhere
-      const double apart = fits[i].value(kHalfGap) / best.value(kHalfGap);
-      if (std::fabs(std::log(apart)) < 0.05) continue;
-      const double first = best.run(stage(kMiddle[0], search_set()));
-      const double second = fits[i].run(stage(kMiddle[0], search_set()));
-      rival_cost_ = std::fabs(second - first);
-      WaveformFit& loser = second < first ? best : fits[i];
-      rival_ = loser.value(kHalfGap);
-      return second < first ? fits[i] : best;
+    for_each_in_parallel(int(fits.size()), [&](int i) {
+      for (const Look& look : kSearch) run(fits[std::size_t(i)], look);
+    });
+    std::stable_sort(fits.begin(), fits.end(),
+                     [](const Fitted& a, const Fitted& b) { return a.fit.cost() < b.fit.cost(); });
+    while (fits.size() > 1 && std::fabs(std::log(fits[1].value(kHalfGap) / fits[0].value(kHalfGap))) < kSame)
+      fits.erase(fits.begin() + 1);
+    if (fits.size() > 2) fits.erase(fits.begin() + 2, fits.end());
+    for (Fitted& f : fits) run(f, kMiddle[0]);
+    if (fits.size() > 1) {
+      const double more = fits[1].fit.cost() - fits[0].fit.cost();
+      if (more < 0) std::swap(fits[0], fits[1]);
+      rival_ = fits[1].value(kHalfGap), rival_cost_ = std::fabs(more);
     }
-    return best;
+    return std::move(fits[0]);
+  }
+
+  /// On all windows, with the noise that it leaves.
+  Fitted fitted(Fitted some) {
+    measure_noise(some);
+    run(some, kMiddle[1]);
+    measure_noise(some);
+    refuse_early();
+    Fitted all(data_, settings_, some.windows->priors(), all_windows());
+    all.fit.shared = some.fit.shared;
+    run(all, kMiddle[1]);
+    return finished(std::move(all));
+  }
+
+  Fitted finished(Fitted f) {
+    for (int i = 0; i < 2; ++i) {
+      measure_noise(f);
+      widen_noise(f);
+      run(f, kLast);
+    }
+    return f;
+  }
+
+  /// What a machine of another kind leaves is no noise of each sample: within half a cycle of the ring it is
+  /// the same, and in all windows to one side, which are one experiment again and again.
+  void widen_noise(const Fitted& f) {
+    const double alike = waveform_ring(settings_) / (2 * data_.interval) * f.windows->count() / 2;
+    for (int c = 0; c < channels(); ++c)
+      noise_[c] = std::hypot(noise_[c], misfit(f, c).left() * std::sqrt(std::max(1.0, alike)));
+  }
+
+  Fitted with_what_it_lacks(const Fitted& plain) {
+    Fitted f(data_, settings_, priors(true), all_windows());
+    f.fit.shared = plain.fit.shared, f.fit.own = plain.fit.own;
+    run(f, kLast);
+    measure_noise(f);
+    widen_noise(f);
+    run(f, kLast);
+    return f;
   }
 
   /// Of the level. A square wave is known by its levels, whatever their noise.
-  double drive_noise(const record::Record& record) const {
-    if (data_.windows[0].drive.empty()) return 0;
-    const double noise =
-        signal::noise_from_differences(record.column(record::Channel::motor_torque), 3) / data_.level;
+  double drive_noise() const {
+    if (data_.square) return 0;
+    const double noise = signal::noise_from_differences(data_.drive, 3) / data_.level;
     if (!(noise <= kMostDriveNoise))
       throw Refusal{
           Status::out_of_domain,
@@ -181,28 +229,10 @@ class Solver {
     return noise;
   }
 
-  double window_rms(const WaveformFit& fit, std::size_t window, WaveformChannel channel) const {
-    double sum = 0;
-    const std::vector<double> r = fit.residual(window, channel);
-    for (const double e : r) sum += e * e / static_cast<double>(r.size());
-    return std::sqrt(sum);
-  }
-
-  int channels() const { return data_.position.empty() ? 1 : 2; }
-
-  void measure_noise(const WaveformFit& fit, const std::vector<bool>& set) {
-    for (int c = 0; c < channels(); ++c) {
-      std::vector<double> rms;
-      for (std::size_t w = 0; w < used_.size(); ++w)
-        if (set[w]) rms.push_back(window_rms(fit, w, static_cast<WaveformChannel>(c)));
-      noise_[c] = signal::median(rms);
-    }
-  }
-
   /// Nothing that comes later would mend this.
   void refuse_early() const {
-    const double noise = signal_noise(kTorqueChannel);
-    if (noise_[kTorqueChannel] > kHopeless * std::max(noise, kHopelessSwing * swing_[kTorqueChannel]))
+    if (noise_[kTorqueChannel] >
+        std::max(3 * signal_noise_[kTorqueChannel], kHopeless * swing_[kTorqueChannel]))
       throw Refusal{
           Status::out_of_domain,
           fmt::format("the machine of the rig file, whatever its values, does not explain the torque: "
@@ -212,13 +242,9 @@ class Solver {
 
   /// At most, by itself: a signal at rest between two steps of its resolution shows no noise.
   double signal_noise(WaveformChannel channel) const {
-    const double period = 2.0 * (data_.windows[1].first - data_.windows[0].first);
+    const double period = 2.0 * double(data_.windows[1].first - data_.windows[0].first);
     std::vector<double> values = channel == kTorqueChannel ? data_.torque : data_.position;
     const double noise = signal::estimate_noise(values, period).upper;
-    std::size_t recorded = 0;  // what is interpolated lies anywhere between two steps
-    for (std::size_t i = 0; i < values.size(); ++i)
-      if (!data_.lost[i]) values[recorded++] = values[i];
-    values.resize(recorded);
     std::sort(values.begin(), values.end());
     double step = std::numeric_limits<double>::infinity();
     for (std::size_t i = 1; i < values.size(); ++i)
@@ -226,117 +252,107 @@ class Solver {
     return std::isfinite(step) ? std::max(noise, step) : noise;
   }
 
-  /// Windows whose motion the start values do not catch.
-  void leave_out(const WaveformFit& fit) {
-    for (int c = 0; c < channels(); ++c) {
-      std::vector<double> rms(used_.size(), 0), of_used;
-      for (std::size_t w = 0; w < used_.size(); ++w)
-        if (used_[w]) of_used.push_back(rms[w] = window_rms(fit, w, static_cast<WaveformChannel>(c)));
-      if (of_used.empty()) return;  // a fit that went nowhere: it is refused for what it leaves out
-      const double middle = signal::median(of_used);
-      const bool locked = data_.grid.output == WaveformOutput::locked;
-      const double most =
-          std::max(middle, kModelError * swing_[c]) * std::sqrt(locked ? kLeftOut : kLeftOutFree[c]);
-      for (std::size_t w = 0; w < used_.size(); ++w)
-        if (!(rms[w] <= most)) used_[w] = false;
-    }
-  }
-
-  WaveformMisfit misfit(const WaveformFit& fit, WaveformChannel channel) const {
+  WaveformMisfit misfit(const Fitted& f, int channel) const {
     double squares = 0, neighbours = 0, count = 0;
-    for (std::size_t w = 0; w < used_.size(); ++w) {
-      if (!used_[w]) continue;
-      const std::vector<double> r = fit.residual(w, channel);
-      for (std::size_t i = 2; i < r.size(); ++i) {
+    for (int w = 0; w < f.windows->count(); ++w) {
+      if (f.fit.weight(w) < kLeftOut) continue;
+      const VectorXd& all = f.fit.residual(w);
+      const Index rows = all.size() / channels();
+      const VectorXd r = f.windows->noise[channel] * all.segment(channel * rows, rows);
+      for (Index i = 2; i < r.size(); ++i) {
         squares += r[i] * r[i], ++count;
         neighbours += r[i] * (r[i - 1] + r[i - 2]) / 2;
       }
     }
+    if (count == 0) squares = std::numeric_limits<double>::infinity(), count = 1;
     const double variance = squares / count, chance = kSure * variance / std::sqrt(2 * count);
-    return {std::sqrt(variance), std::sqrt(std::max(0.0, neighbours / count - chance)), signal_noise(channel),
-            swing_[channel], kDriveNoise[channel] * drive_noise_ * swing_[channel]};
+    return {std::sqrt(variance), std::sqrt(std::max(0.0, neighbours / count - chance)),
+            signal_noise_[channel], swing_[channel], kDriveNoise[channel] * drive_noise_ * swing_[channel]};
   }
 
-  WaveformEvidence::Trace trace(const WaveformFit& fit, std::size_t window, WaveformChannel channel) const {
-    const std::vector<double>& all = channel == kTorqueChannel ? data_.torque : data_.position;
-    const std::vector<double> r = fit.residual(window, channel);
-    WaveformEvidence::Trace trace;
-    for (std::size_t i = 0; i < r.size(); ++i) {
-      trace.measured.push_back(all[static_cast<std::size_t>(data_.windows[window].first) + i]);
-      trace.model.push_back(trace.measured.back() - r[i]);
-    }
-    return trace;
-  }
-
-  double fitted_noise(WaveformChannel channel) const {
-    return std::max(noise_[channel], kModelError * swing_[channel]);
-  }
-
-  WaveformEvidence evidence(const WaveformFit& fit) const {
+  WaveformEvidence evidence(const Fitted& f) const {
     WaveformEvidence e;
-    e.interval = data_.grid.interval;
-    e.torque_noise = fitted_noise(kTorqueChannel);
-    e.position_noise = channels() > 1 ? fitted_noise(kPositionChannel) : kNaN;
-    e.left_out = static_cast<int>(std::count(used_.begin(), used_.end(), false));
-    for (std::size_t w = 0; w < used_.size(); ++w) {
-      if (!used_[w]) continue;
+    e.interval = data_.interval;
+    e.torque_noise = f.windows->noise[kTorqueChannel];
+    e.position_noise = channels() > 1 ? f.windows->noise[kPositionChannel] : kNaN;
+    for (int w = 0; w < f.windows->count(); ++w) {
+      if (f.fit.weight(w) < kLeftOut) {
+        ++e.left_out;
+        continue;
+      }
+      const WaveformWindow& of = data_.windows[std::size_t(w)];
       WaveformEvidence::Window window;
-      window.start = time_[static_cast<std::size_t>(data_.windows[w].first)];
+      window.start = data_.time[of.first];
+      const std::size_t rows = f.windows->length(w);
+      window.times.assign(of.at.begin(), of.at.begin() + std::ptrdiff_t(rows));
       for (int c = 0; c < channels(); ++c) {
-        const auto channel = static_cast<WaveformChannel>(c);
-        window.misfit = std::max(window.misfit, window_rms(fit, w, channel) / fitted_noise(channel));
-        (c == kTorqueChannel ? window.torque : window.position) = trace(fit, w, channel);
+        window.misfit = std::max(window.misfit, f.rms(w, c));
+        WaveformEvidence::Trace& trace = c == kTorqueChannel ? window.torque : window.position;
+        const std::vector<double>& all = c == kTorqueChannel ? data_.torque : data_.position;
+        for (std::size_t i = 0; i < rows; ++i) {
+          trace.measured.push_back(all[of.first + i]);
+          trace.model.push_back(trace.measured.back() -
+                                f.windows->noise[c] * f.fit.residual(w)[Index(std::size_t(c) * rows + i)]);
+        }
       }
       e.windows.push_back(std::move(window));
     }
     return e;
   }
 
-  WaveformSolution told(const WaveformFit& fit, const WaveformPriors& priors) const {
+  /// With the values' deviations from what is declared, their common factor within them.
+  WaveformSolution solution(const Fitted& f) const {
     WaveformSolution s;
-    s.half_gap = fit.value(kHalfGap);
-    const double wider = settings_.output == WaveformOutput::locked ? 1 : kFreeLink * kFreeLink;
-    const Eigen::MatrixXd covariance = wider * fit.covariance();
-    s.z.assign(fit.point.z.data(), fit.point.z.data() + kGlobalValues);
-    s.told.assign(kGlobalValues, 1);
-    for (std::size_t i = 0; i < fit.fitted().size(); ++i) {
-      const auto k = static_cast<Eigen::Index>(i);
-      s.told[static_cast<std::size_t>(fit.fitted()[i])] = std::min(1.0, std::sqrt(covariance(k, k)));
+    s.priors = f.windows->priors();
+    s.half_gap = f.value(kHalfGap);
+    s.wider = settings_.output == WaveformOutput::locked ? 1 : kFreeLink * kFreeLink;
+    MatrixXd total = MatrixXd::Zero(kGlobalValues, kSharedValues);
+    for (int k = 0; k < kGlobalValues; ++k) {
+      if (!(s.priors.shared[std::size_t(k)].spread > 0)) continue;
+      s.fitted.push_back(k);
+      total(k, k) = 1;
+      if (k != kHalfGap) total(k, kCommonScale) = s.priors.common(k);
     }
-    for (int k = 0; k < kGlobalValues; ++k) s.values.push_back(fit.value(k));
-    s.log_error = priors[kHalfGap].spread * s.told[kHalfGap];
-    if (data_.position.empty())
-      s.log_error = std::max(s.log_error, waveform_symmetry_error(priors, settings_.common_scale));
-    Eigen::VectorXd machine = fit.point.z;
-    machine[kHalfGap] = 0;
-    s.prior_cost = fit.prior_cost(machine);
-    s.covariance = Eigen::MatrixXd::Zero(kGlobalValues, kGlobalValues);
-    s.covariance(fit.fitted(), fit.fitted()) = covariance;
-    s.information = fit.information(), s.fitted = fit.fitted(), s.wider = wider;
-    s.priors = priors, s.common_scale = settings_.common_scale;
+    s.covariance = s.wider * (total * f.fit.covariance() * total.transpose());
+    const double clustered = s.wider * f.fit.clustered_covariance()(kHalfGap, kHalfGap);
+    const VectorXd z = total * f.fit.shared;
+    s.z.assign(z.data(), z.data() + kGlobalValues);
+    s.pull.assign(f.fit.shared.data(), f.fit.shared.data() + kGlobalValues);
+    s.told.assign(kGlobalValues, 1);
+    for (const int k : s.fitted) s.told[std::size_t(k)] = std::min(1.0, std::sqrt(s.covariance(k, k)));
+    for (int k = 0; k < kGlobalValues; ++k) s.values.push_back(f.value(k));
+    s.log_error =
+        s.priors.shared[kHalfGap].spread * std::max(s.told[kHalfGap], std::min(1.0, std::sqrt(clustered)));
+    if (data_.position.empty()) s.log_error = std::max(s.log_error, waveform_symmetry_error(s.priors));
+    s.prior_cost = f.fit.shared.squaredNorm() - std::pow(f.fit.shared[kHalfGap], 2);
+    s.information =
+        (f.fit.information() - MatrixXd::Identity(kSharedValues, kSharedValues))(s.fitted, s.fitted);
+    s.foreign_torque = kForeignTorque * data_.level;
     s.finest = settings_.finest(), s.unit = settings_.angular ? "rad" : "m";
-    for (int c = 0; c < channels(); ++c) s.misfit[c] = misfit(fit, static_cast<WaveformChannel>(c));
-    s.windows = static_cast<int>(used_.size());
-    s.left_out = static_cast<int>(std::count(used_.begin(), used_.end(), false));
-    s.iterations = fit.iterations();
-    s.cost = fit.cost();
+    for (int c = 0; c < channels(); ++c) s.misfit[c] = misfit(f, c);
+    s.evidence = evidence(f);
+    s.windows = f.windows->count(), s.left_out = s.evidence.left_out;
+    s.cost = f.fit.cost();
     s.rival = rival_, s.rival_cost = rival_cost_;
-    s.evidence = evidence(fit);
     return s;
   }
 
   const WaveformSettings& settings_;
-  double ring_;
-  std::vector<double> time_;
+  WaveformTask task_;
   WaveformData data_;
-  double told_gap_, told_error_;
-  double swing_[kWaveformChannels], noise_[kWaveformChannels];
-  std::vector<bool> used_;
+  double swing_[kWaveformChannels] = {1, 1}, noise_[kWaveformChannels] = {0, 0},
+         signal_noise_[kWaveformChannels] = {0, 0};
   double drive_noise_ = 0;
   double rival_ = kNaN, rival_cost_ = kNaN;
 };
 
 }  // namespace
+
+double WaveformMisfit::left() const {
+  const double noise_of = std::hypot(noise, drive);
+  return std::max(std::sqrt(std::max(0.0, rms * rms - noise_of * noise_of)),
+                  std::sqrt(std::max(0.0, structure * structure - drive * drive)));
+}
 
 const char* waveform_value_name(int which) {
   static const char* const names[kGlobalValues] = {"half gap",
@@ -361,15 +377,23 @@ const char* waveform_value_name(int which) {
                                                    "delay of the sensor",
                                                    "time constant of the sensor",
                                                    "delay of the torque",
+                                                   "time constant of the torque",
                                                    "offset of the drive",
                                                    "slope of the drive",
-                                                   "zero of the position"};
+                                                   "zero of the position",
+                                                   "Stribeck friction",
+                                                   "load-dependent friction",
+                                                   "quadratic drag",
+                                                   "dry friction of the pinion",
+                                                   "exponent of the teeth",
+                                                   "hysteresis of the teeth",
+                                                   "curve of the sensor"};
   return names[which];
 }
 
-WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings, double told,
-                                double told_error, const std::vector<double>& places) {
-  return Solver(record::even_grid(record), settings, told, told_error, places).solve();
+WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings,
+                                const WaveformTask& task) {
+  return Solver(record, settings, task).solve();
 }
 
 }  // namespace backlash::diagnosis

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/diagnosis/waveform.h"
-#include "waveform_fit.h"
+#include "waveform_residuals.h"
 
 namespace backlash::diagnosis {
 
@@ -17,45 +17,52 @@ struct WaveformMisfit {
   double noise = 0;      // of the channel by itself, at most
   double swing = 0;      // of the channel
   double drive = 0;      // what noise of the torque that drives may leave
+
+  /// What is no noise of the channel, nor of the torque that drives.
+  double left() const;
 };
 
 struct WaveformSolution {
-  double half_gap = kNaN;       // m
-  double log_error = kNaN;      // standard error of its logarithm
-  std::vector<double> z;        // values in spreads from the declared ones
-  std::vector<double> values;   // in their units
-  double prior_cost = 0;        // chi^2 of all values but the gap, against what was known
-  Eigen::MatrixXd covariance;   // of all values, in spreads; 0 where a value is not fitted
-  Eigen::MatrixXd information;  // of those that are fitted, in their order, with what was known: its inverse
+  double half_gap = kNaN;      // m
+  double log_error = kNaN;     // standard error of its logarithm, the larger of the fit's and of the windows'
+  std::vector<double> z;       // values in spreads from the declared ones
+  std::vector<double> pull;    // of what was known on each, in spreads
+  std::vector<double> values;  // in their units
+  double prior_cost = 0;       // chi^2 of all values but the gap, against what was known
+  Eigen::MatrixXd covariance;  // of all values, in spreads; 0 where a value is not fitted
+  Eigen::MatrixXd information;  // of those that are fitted, in their order, without what was known
   std::vector<int> fitted;
-  double wider = 1;  // -, times which the covariance is that inverse
+  double wider = 1;  // -, times which the covariance is that of the fit
   WaveformPriors priors;
-  double common_scale = 0;
   double finest = kNaN;      // half width of the narrowest interval, in `unit`
   const char* unit = "m";    // of the gap
   std::vector<double> told;  // share of the prior spread that the record leaves, per value; 1: tells nothing
   WaveformMisfit misfit[kWaveformChannels];
-  int windows = 0, left_out = 0, iterations = 0;
+  int windows = 0, left_out = 0;
+  bool lacking = false;       // the rig file lacks something of the machine
+  double foreign_torque = 0;  // N m, that it may hold without being seen, then
   double cost = 0;
   WaveformEvidence evidence;
   double rival = kNaN;       // m, half gap of the next best guess
   double rival_cost = kNaN;  // its cost more than that of the best, at the same stage
+
+  bool position() const { return misfit[kPositionChannel].swing > 0; }
+};
+
+/// What of a record is fitted, and what is known of its play.
+struct WaveformTask {
+  double from = -1e300, to = 1e300;          ///< s
+  double half_gap = kNaN, log_error = kNaN;  ///< m, standard deviation of the logarithm; NaN: nothing
 };
 
 /// Throws Refusal where the record cannot be used.
-/// `told`: half gap, m, by itself, with the standard deviation of its logarithm; NaN: not told.
-/// `places`: as of waveform_windows().
 WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings,
-                                double told = kNaN, double told_error = kNaN,
-                                const std::vector<double>& places = {});
+                                const WaveformTask& task = {});
 
 /// Throws Refusal for a record without the channels, InvalidParameter for settings out of range.
 void check_waveform(const record::Record& record, const WaveformSettings& settings);
 
 /// Throws Refusal where the solution is not to be believed.
 void refuse_waveform(const WaveformSolution& solution);
-
-/// Name of a value for messages.
-const char* waveform_value_name(int which);
 
 }  // namespace backlash::diagnosis

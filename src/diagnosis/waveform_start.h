@@ -2,16 +2,19 @@
 // How the windows of a fit start, as far as the record and the declared machine tell it beforehand.
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
-#include "waveform_fit.h"
+#include "waveform_windows.h"
 
 namespace backlash::diagnosis {
 
-/// One guess per window of the data.
-std::vector<WaveformStartGuess> waveform_starts(const WaveformData& data, const WaveformSettings& settings);
+using WaveformStart = Eigen::Matrix<double, kStartValues, 1>;
+struct WaveformStartGuess {
+  WaveformStart value = WaveformStart::Zero(), spread = WaveformStart::Zero();  ///< spread 0: it is known
+};
 
-/// How many of the start values are fitted.
-int waveform_start_count(const WaveformData& data, const WaveformSettings& settings);
+/// One per window of the data.
+std::vector<WaveformStartGuess> waveform_starts(const WaveformData& data, const WaveformSettings& settings);
 
 }  // namespace backlash::diagnosis

@@ -6,24 +6,21 @@
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "refusal.h"
 #include "waveform_solution.h"
-#include "waveform_windows.h"
 
 namespace backlash::diagnosis {
 namespace {
 
-/// The fitted values that are not among `places` eliminated, and what was known of those that are taken off:
-/// one spread each.
+/// The fitted values that are not among `places` eliminated, with what was known of them.
 Eigen::MatrixXd information_of(const WaveformSolution& s, const std::vector<int>& places) {
   std::vector<int> kept, rest;
   for (std::size_t i = 0; i < s.fitted.size(); ++i)
     (std::find(places.begin(), places.end(), s.fitted[i]) != places.end() ? kept : rest)
         .push_back(static_cast<int>(i));
-  const Eigen::MatrixXd& all = s.information;
-  const Eigen::MatrixXd across = all(rest, kept);
-  const auto count = static_cast<Eigen::Index>(kept.size());
-  return (all(kept, kept) -
-          signal::transposed_product(across, signal::solve_symmetric(all(rest, rest), across)) -
-          Eigen::MatrixXd::Identity(count, count)) /
+  const Eigen::MatrixXd across = s.information(rest, kept);
+  Eigen::MatrixXd others = s.information(rest, rest);
+  others.diagonal().array() += 1;
+  return (s.information(kept, kept) -
+          signal::transposed_product(across, signal::solve_symmetric(others, across))) /
          s.wider;
 }
 
@@ -48,13 +45,14 @@ void fill(const WaveformSolution& s, const WaveformSettings& settings, WaveformV
     places.push_back(kQuantityPlaces[i]);
   }
   out.z.resize(static_cast<Eigen::Index>(places.size()));
+  out.slope.resize(out.z.size());
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto k = static_cast<std::size_t>(places[i]);
     out.z[static_cast<Eigen::Index>(i)] = s.z[k];
-    out.spread.push_back(s.priors[k].spread);
+    out.slope[static_cast<Eigen::Index>(i)] = s.pull[k] / s.wider;
+    out.spread.push_back(s.priors.shared[k].spread);
   }
   out.information = information_of(s, places);
-  out.slope = out.z / s.wider;
   for (int c = 0; c < kWaveformChannels; ++c)
     if (s.misfit[c].swing > 0) out.residual[c] = s.misfit[c].rms, out.swing[c] = s.misfit[c].swing;
   out.windows = s.windows, out.left_out = s.left_out;
@@ -66,15 +64,8 @@ WaveformValues waveform_values(const record::Record& record, double from, double
                                const WaveformSettings& settings, double backlash, double spread) {
   WaveformValues out;
   try {
-    const record::Record part = record.slice(from, to);
-    check_waveform(part, settings);
-    const record::EvenGrid even = record::even_grid(record);
-    std::vector<double> places = waveform_reversals(even);
-    const auto before =
-        std::lower_bound(even.record.time.begin(), even.record.time.end(), part.time.front()) -
-        even.record.time.begin();
-    for (double& place : places) place -= static_cast<double>(before);
-    fill(solve_waveform(part, settings, backlash / 2, spread, places), settings, out);
+    check_waveform(record, settings);
+    fill(solve_waveform(record, settings, {from, to, backlash / 2, spread}), settings, out);
   } catch (const Refusal& refusal) {
     out.status = refusal.status;
     out.reason = refusal.reason;

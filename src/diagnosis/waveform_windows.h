@@ -1,32 +1,35 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The reversals of the motor's torque in a record, and the windows about them.
+// The reversals of the motor's torque in a record, and the windows about them. Samples count at the times at
+// which they were taken (record/even_grid.h): one that is lost is a row that is not there.
 #pragma once
 
 #include <vector>
 
-#include "backlash_diagnosis/record/even_grid.h"
+#include "backlash_diagnosis/record/record.h"
 #include "waveform_motion.h"
 
 namespace backlash::diagnosis {
 
-/// Of a torque that is no square wave, windows have its samples (`drive`). A window that lacks a tenth of
-/// its samples, or one before its reversal, is left out; other lost samples do not count. Throws Refusal
-/// where the samples are uneven or too few.
-///   ring     s, cycle of the motor against the pinion: sets the scale of all times
-///   longest  the most windows to return, spread evenly over the record
-///   places   of the reversals of a square wave, in samples, as waveform_reversals() tells them from a longer
-///            record; empty: told from this one
-///   free     whether the link is, so that a smooth torque turns on the teeth at another time than at the
-///   motor
-std::vector<WaveformWindow> waveform_windows(const record::EvenGrid& even, double ring, int most, bool free,
-                                             const std::vector<double>& places = {});
+/// What was measured, and about which reversals it is looked at.
+struct WaveformData {
+  std::vector<double> time, drive, torque, position;  // s, N m, N m, rad; no position: torque alone
+  double interval = 0;                                // s, usual, between samples
+  double level = 0;                                   // N m, usual torque of the motor
+  bool square = true;                                 // it is a square wave, else its samples drive
+  std::vector<WaveformWindow> windows;
+};
 
-/// Where a square wave reverses, in samples, more finely than one where its period is steady. Throws Refusal
-/// for a torque that never reverses.
-std::vector<double> waveform_reversals(const record::EvenGrid& even);
+struct WaveformCut {
+  double ring = 0;          ///< s, cycle of the motor against the pinion: sets the scale of all times
+  int most = 0;             ///< windows, spread evenly over the record
+  bool free = false;        ///< the link is, so that a smooth torque turns on the teeth at another time
+  double from = 0, to = 0;  ///< s, within which windows lie; the rest shows when a square wave reverses
+};
 
-/// Samples before the reversal, and after it for a stage of the fit that looks `rings` cycles far.
-int waveform_lead(double ring, double interval);
-int waveform_length(const WaveformWindow& window, double rings, double ring, double interval);
+/// A window that lacks half of its samples is left out. Throws Refusal where the samples are too few.
+WaveformData waveform_data(const record::Record& record, const WaveformCut& cut);
+
+/// How many samples a stage of the fit sees that looks `rings` cycles beyond the reversal.
+std::size_t waveform_length(const WaveformWindow& window, double rings, double ring);
 
 }  // namespace backlash::diagnosis

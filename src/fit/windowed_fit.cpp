@@ -17,9 +17,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Spreads, by which a value is moved for a difference: large beside rounding and what the integration leaves,
-// small beside what bends the residuals.
-constexpr double kSharedStep = 1e-3, kOwnStep = 1e-3;
 // Of one window alone, which ends where a step gains less than this share of its cost.
 constexpr int kSettleSteps = 15;
 constexpr double kSettled = 1e-3;
@@ -110,24 +107,25 @@ WindowedFit::WindowedFit(const Windows& windows)
 
 WindowedFit::Part WindowedFit::part_of(int window, const VectorXd& mine, bool with_shared) const {
   const Eigen::Index n = shared.size(), m = mine.size();
+  const auto prior = [&](Eigen::Index k) -> const Prior& {
+    return k < n ? windows_->shared()[std::size_t(k)] : windows_->own()[std::size_t(k - n)];
+  };
   std::vector<Eigen::Index> moved;
   for (Eigen::Index k = with_shared ? 0 : n; k < n + m; ++k)
-    if ((k < n ? windows_->shared()[std::size_t(k)] : windows_->own()[std::size_t(k - n)]).spread > 0)
-      moved.push_back(k);
-  const auto columns = Eigen::Index(moved.size()) + 1;
+    if (prior(k).spread > 0) moved.push_back(k);
+  const int sides = central_ ? 2 : 1;
+  const Eigen::Index columns = 1 + sides * Eigen::Index(moved.size());
   MatrixXd at = shared.replicate(1, columns), own_at = mine.replicate(1, columns);
   for (Eigen::Index i = 1; i < columns; ++i) {
-    const Eigen::Index k = moved[std::size_t(i - 1)];
-    if (k < n)
-      at(k, i) += kSharedStep;
-    else
-      own_at(k - n, i) += kOwnStep;
+    const Eigen::Index k = moved[std::size_t((i - 1) / sides)];
+    const double step = (i - 1) % sides == 0 ? prior(k).step : -prior(k).step;
+    (k < n ? at(k, i) : own_at(k - n, i)) += step;
   }
   const MatrixXd r = windows_->residuals(window, at, own_at);
   Part part{r.col(0), MatrixXd::Zero(r.rows(), n + m)};
-  for (Eigen::Index i = 1; i < columns; ++i) {
-    const Eigen::Index k = moved[std::size_t(i - 1)];
-    part.slopes.col(k) = (r.col(i) - part.residual) / (k < n ? kSharedStep : kOwnStep);
+  for (Eigen::Index i = 0; i < Eigen::Index(moved.size()); ++i) {
+    const Eigen::Index k = moved[std::size_t(i)], first = 1 + sides * i;
+    part.slopes.col(k) = (r.col(first) - r.col(central_ ? first + 1 : 0)) / (sides * prior(k).step);
   }
   return part;
 }
@@ -193,7 +191,9 @@ void WindowedFit::run(const FitOptions& options) {
   ceres::Solve(solver, &problem, &summary);
   evaluation.take();
   cost_ = summary.IsSolutionUsable() ? 2 * summary.final_cost : std::numeric_limits<double>::infinity();
+  central_ = options.central;
   evaluate();
+  central_ = false;
 }
 
 double WindowedFit::weight(int window) const {
@@ -224,12 +224,15 @@ void WindowedFit::reduce(int window, MatrixXd* information, VectorXd* score) con
                solver.solve(VectorXd(f * (o.transpose() * part.residual) + own[std::size_t(window)]));
 }
 
-MatrixXd WindowedFit::covariance() const {
-  const Eigen::Index n = shared.size();
-  MatrixXd information = MatrixXd::Identity(n, n);
+MatrixXd WindowedFit::information() const {
+  MatrixXd information = MatrixXd::Identity(shared.size(), shared.size());
   VectorXd score;
   for (int w = 0; w < windows_->count(); ++w) reduce(w, &information, &score);
-  return information.ldlt().solve(MatrixXd::Identity(n, n));
+  return information;
+}
+
+MatrixXd WindowedFit::covariance() const {
+  return information().ldlt().solve(MatrixXd::Identity(shared.size(), shared.size()));
 }
 
 MatrixXd WindowedFit::clustered_covariance() const {

@@ -118,4 +118,10 @@ EvenGrid even_grid(const Record& record) {
   return even;
 }
 
+std::vector<double> sampling_times(const Record& record) {
+  if (record.size() < 4) return record.time;
+  const std::optional<Grid> grid = grid_of(record.time, record.sampling_interval());
+  return grid ? sampled_at(record, *grid) : record.time;
+}
+
 }  // namespace backlash::record

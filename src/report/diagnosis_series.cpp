@@ -93,6 +93,7 @@ Json waveform_json(const DiagnosisReport& report) {
   for (const std::size_t i : shown_windows(*evidence)) {
     const diagnosis::WaveformEvidence::Window& window = evidence->windows[i];
     json["windows"].push_back({{"start", window.start},
+                               {"times", column(window.times, 1)},
                                {"misfit", json_number(window.misfit)},
                                {"torque", trace_json(window.torque)},
                                {"position", trace_json(window.position)}});

@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs diagnose_record on joints of a robot's size that make_robot_joint draws, and counts answers and misses.
+"""Runs diagnose_record on machines that make_robot_joint or make_torque_rig draws, and counts answers and misses.
 
 Each joint is recorded in two motions, with the load's encoder and with the motor's alone. A record shows the play where
-each flank is pressed for a tenth of the time and the gap is crossed ten times, by a loop that is stable; the others are counted apart. With
+each flank is pressed for a tenth of the time and the gap is crossed ten times, by a loop that is stable; the others are counted apart.
+Each rig is recorded under three torques, with motor_position and without. With
 --before the answers are compared with those that an earlier run has written: newly answered, lost, newly outside.
 Exit code: 0, 64 usage, 66 executable missing.
 """
@@ -12,44 +13,57 @@ import collections
 import concurrent.futures
 import csv
 import json
+import os
 import pathlib
 import statistics
 import subprocess
 import sys
-import time
+import tempfile
 
-MOTOR = ("time", "motor_torque", "motor_position")
+MOTOR = ("time", "motor_torque", "motor_position")  # of a joint, where it has no other encoder
+TORQUES = ("time", "motor_torque", "sensor_torque")  # of a rig, where it has no encoder
 SHOWN_SHARE, SHOWN_CROSSINGS = 0.1, 10  # what a record that shows the play has at least
 HAMMERS = 1000  # crossings, of a loop that is not stable: no robot is left so
 
 
-def motor_alone(path):
-    motor = path.with_name(f"{path.stem}_motor.csv")
-    if not motor.is_file():
-        with open(path, newline="", encoding="utf-8") as whole, open(motor, "w", newline="", encoding="utf-8") as part:
-            writer = csv.DictWriter(part, MOTOR, extrasaction="ignore", lineterminator="\n")
+def one_channel_less(path):
+    part = path.with_name(f"{path.stem}_motor.csv")
+    if not part.is_file():
+        with open(path, newline="", encoding="utf-8") as whole, open(part, "w", newline="", encoding="utf-8") as fewer:
+            rows = csv.DictReader(whole)
+            writer = csv.DictWriter(fewer, TORQUES if "sensor_torque" in rows.fieldnames else MOTOR, extrasaction="ignore",
+                                    lineterminator="\n")
             writer.writeheader()
-            writer.writerows(csv.DictReader(whole))
-    return motor
+            writer.writerows(rows)
+    return part
+
+
+def run_command(command):
+    """What it writes to standard error, and the seconds of processor that it takes."""
+    with tempfile.TemporaryFile() as errors:
+        with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors) as process:
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+        errors.seek(0)
+        return errors.read().decode(), usage.ru_utime + usage.ru_stime
 
 
 def diagnose(folder, motion, alone, args):
     """One line of the table: what is true, what was answered."""
     truth = json.loads((folder / "truth.json").read_text())
     shown = truth["motions"][motion]
-    record = motor_alone(folder / f"{motion}.csv") if alone else folder / f"{motion}.csv"
+    record = one_channel_less(folder / f"{motion}.csv") if alone else folder / f"{motion}.csv"
     report = folder / f"{record.stem}.json"
     report.unlink(missing_ok=True)
     rig = folder / "rig_motor_alone.yaml"
-    start = time.monotonic()
-    run = subprocess.run([args.diagnose, str(record), "--rig", str(rig if alone and rig.is_file() else folder / "rig.yaml"),
-                          "--json", str(report)], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    took = time.monotonic() - start
+    errors, took = run_command([args.diagnose, str(record), "--rig", str(rig if alone and rig.is_file() else folder / "rig.yaml"),
+                                "--json", str(report)] + (["--method", args.method] if args.method else []))
     line = {"name": f"{folder.name}/{record.stem}", "alone": alone, "true": truth["backlash_angle"], "took": took,
-            "shows": min(shown["press_pos"], shown["press_neg"]) > SHOWN_SHARE and SHOWN_CROSSINGS <= shown["crossings"] < HAMMERS,
+            "shows": "crossings" not in shown or (min(shown["press_pos"], shown["press_neg"]) > SHOWN_SHARE
+                                                  and SHOWN_CROSSINGS <= shown["crossings"] < HAMMERS),
             "answers": {}, "reasons": {}}
     if not report.is_file():
-        line["reasons"]["verdict"] = run.stderr.strip()
+        line["reasons"]["verdict"] = errors.strip()
         return line
     answer = json.loads(report.read_text())
     for estimate in answer["estimates"]:
@@ -94,7 +108,9 @@ def compare(before, lines):
 def read_arguments():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--diagnose", required=True, metavar="EXECUTABLE")
-    parser.add_argument("--make", required=True, metavar="EXECUTABLE", help="make_robot_joint")
+    parser.add_argument("--make", required=True, metavar="EXECUTABLE", help="make_robot_joint or make_torque_rig")
+    parser.add_argument("--make-option", dest="make_options", action="append", default=[], metavar="OPTION", help="of --make")
+    parser.add_argument("--method", metavar="NAME", help="this estimator alone")
     parser.add_argument("--keep", required=True, type=pathlib.Path, metavar="FOLDER", help="for records and answers")
     parser.add_argument("--seeds", default="1-20", metavar="FIRST-LAST")
     parser.add_argument("--folders", nargs="*", type=pathlib.Path, help="joints that are there, in place of drawn ones")
@@ -115,7 +131,7 @@ def make(args):
     folders = [args.keep / str(seed) for seed in range(first, last + 1)]
     for folder in folders:
         if not (folder / "truth.json").is_file():
-            subprocess.run([args.make, "--seed", folder.name, "--out", str(folder)], check=True)
+            subprocess.run([args.make, "--seed", folder.name, "--out", str(folder)] + args.make_options, check=True)
     return folders
 
 
@@ -125,7 +141,7 @@ def main():
     kinds = {"both": (False,), "motor": (True,), "all": (False, True)}[args.channels]
     with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
         jobs = [pool.submit(diagnose, folder, motion, alone, args)
-                for folder in folders for motion in ("m0", "m1") for alone in kinds]
+                for folder in folders for motion in json.loads((folder / "truth.json").read_text())["motions"] for alone in kinds]
         lines = [job.result() for job in jobs]
     for line in lines:
         result = judge(line)
@@ -135,10 +151,10 @@ def main():
         for shows in (True, False):
             some = [line for line in lines if line["alone"] == alone and line["shows"] == shows]
             if some:
-                print(f"{'motor encoder alone' if alone else 'both encoders'}, {'play shown' if shows else 'play not shown'}:")
+                print(f"{'one channel less' if alone else 'all channels'}, {'play shown' if shows else 'play not shown'}:")
                 for who in sorted({who for line in some for who in line["answers"]}):
                     show(some, who)
-    print(f"time of a command: median {statistics.median(line['took'] for line in lines):.1f} s")
+    print(f"processor of a command: median {statistics.median(line['took'] for line in lines):.1f} s")
     if args.before:
         compare(json.loads(args.before.read_text()), lines)
     if args.json:

@@ -103,9 +103,10 @@ TEST(Waveform, MachinesWithAllValuesOff) {
     const Estimate alone = diagnosis::estimate_waveform(without_position(record), declared());
     expect_holds(alone, backlash);
     EXPECT_NE(alone.message.find("limited by the declared stiffness"), std::string::npos) << alone.message;
-    // By theory 2.2 / sqrt(information of the priors on the scale): 12 to 15 %.
+    // By theory 2.3 / sqrt(information of the priors on the scale) at least: 14 %; of 25 um +-0.6 um beside
+    // it.
     EXPECT_GT(alone.upper - alone.lower, 0.2 * alone.backlash);
-    EXPECT_LT(alone.upper - alone.lower, 0.32 * alone.backlash);
+    EXPECT_LT(alone.upper - alone.lower, 0.34 * alone.backlash);
   }
 }
 
@@ -161,7 +162,7 @@ TEST(Waveform, FreeLink) {
     EXPECT_NEAR(both.backlash, backlash, 0.02 * backlash);  // a sixth of what torque alone tells
     const Estimate alone = diagnosis::estimate_waveform(without_position(record), settings);
     expect_holds(alone, backlash);
-    EXPECT_LT(alone.upper - alone.lower, 0.6 * alone.backlash);  // of a locked output: 0.26
+    EXPECT_LT(alone.upper - alone.lower, 0.62 * alone.backlash);  // of a locked output: 0.3
     const auto found = diagnosis::commission_waveform({record}, settings);
     const double inertia = file.rig.link.inertia + (rigid ? file.rig.gear.inertia : 0);
     const double error = std::hypot(found.machine.spread.link_inertia, found.machine.common_scale);
@@ -302,13 +303,13 @@ TEST(Waveform, NoPlayIsBelowRange) {
   EXPECT_LT(e.upper, 3e-6);
 }
 
-/// A contact that is a linear spring with a damper, which the equations do not have.
-TEST(Waveform, AnotherContactIsOutOfDomain) {
+/// Teeth that are a linear spring with a damper, declared after Hertz: their exponent is 0.5 less.
+TEST(Waveform, AnotherContactIsNamed) {
   rig_file::RigFile file = drawn(9, 50e-6);
   file.rig.mesh.contact = model::make_contact_law("kelvin_voigt", {{"stiffness", 4e5}, {"damping", 5}});
-  const record::Record record = record_of(file);
-  const Estimate e = diagnosis::estimate_waveform(record, declared());
-  EXPECT_EQ(e.status, Status::out_of_domain) << e.message << e.backlash;
+  const Estimate e = diagnosis::estimate_waveform(record_of(file), declared());
+  expect_holds(e, 50e-6);
+  EXPECT_NE(e.message.find("the rig file lacks: exponent of the teeth -0."), std::string::npos) << e.message;
 }
 
 TEST(Waveform, OnlyRigsThatItsEquationsDescribe) {
@@ -336,7 +337,8 @@ TEST(Waveform, CommissionedWhenNewFromTorqueAlone) {
       diagnosis::estimate_waveform(without_position(record_of(drawn(31, worn))), told.machine);
   expect_holds(absolute, worn);
   EXPECT_NEAR(absolute.backlash, worn, 0.02 * worn);
-  EXPECT_LT(absolute.upper - absolute.lower, 0.08 * worn);
+  // 2.3 errors to either side, of 1 % that is known of the first play and as much of the values beside it.
+  EXPECT_LT(absolute.upper - absolute.lower, 0.09 * worn);
 }
 
 TEST(Waveform, CommissionedFromTwoStates) {

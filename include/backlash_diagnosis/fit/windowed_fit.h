@@ -23,6 +23,8 @@ struct Prior {
   double centre = 0;  ///< > 0 of a factor
   double spread = 1;  ///< one standard deviation, of the logarithm of a factor; 0: it is known
   bool factor = true;
+  double step = 1e-3;  ///< spreads, by which it is moved for a difference: large beside rounding and what the
+                       ///< integration leaves, small beside what bends the residuals
   double value(double z) const;
 };
 using Priors = std::vector<Prior>;
@@ -45,6 +47,8 @@ struct FitOptions {
   double radius = 100;      ///< of the first trust region, in spreads
   double robust = 4;        ///< > 0: a window with so many times its rows as squares has half of its weight
   double tolerance = 1e-5;  ///< relative gain of the cost, at which it ends
+  bool central = false;     ///< differences to both sides for the errors of the answer: those to one side add
+                            ///< information where values nearly mix
 };
 
 class WindowedFit {
@@ -67,6 +71,8 @@ class WindowedFit {
   /// Covariance of the shared values in spreads: of the fit, and with windows as clusters (sandwich; Liang
   /// and Zeger 1986).
   Eigen::MatrixXd covariance() const;
+  /// Its inverse: what the windows say, their own values eliminated, and one of each prior.
+  Eigen::MatrixXd information() const;
   Eigen::MatrixXd clustered_covariance() const;
 
  private:
@@ -87,6 +93,7 @@ class WindowedFit {
   const Windows* windows_;
   std::vector<Part> parts_;
   double robust_ = 0, cost_ = 0;
+  bool central_ = false;
 };
 
 }  // namespace backlash::fit

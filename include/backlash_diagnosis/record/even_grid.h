@@ -31,4 +31,8 @@ struct EvenGrid {
 /// place. A record of which more than half would be lost is returned as it is.
 EvenGrid even_grid(const Record& record);
 
+/// When the samples were taken, for methods that take each at its own time: as even_grid() decides, at the
+/// stamps or evenly, with lost samples between them.
+std::vector<double> sampling_times(const Record& record);
+
 }  // namespace backlash::record
