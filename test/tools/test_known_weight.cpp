@@ -49,8 +49,8 @@ TEST_F(KnownWeight, OfASingleJointMeasuresItsTorqueConstant) {
   write("two.csv", pendulum(2, 3));
   done(
       "identify bare.csv one.csv two.csv --payload \"one.csv=1 kg +- 0.1 % at 0.15 m\" "
-      "--payload \"two.csv=2 kg at 150 mm\" --rig joint.yaml --out fitted.yaml --json fit.json");
-  const Json parameters = json("fit.json").at("parameters");
+      "--payload \"two.csv=2 kg at 150 mm\" --rig joint.yaml --out fitted.yaml");
+  const Json parameters = json("fitted.json").at("parameters");
   const auto expect = [&](const char* name, double truth, double share) {
     const double value = parameters.at(name).at("value"), error = parameters.at(name).at("standard_error");
     EXPECT_NEAR(value, truth, share * truth) << name;

@@ -209,8 +209,8 @@ int weigh_joint(const Arguments& arguments, RecordDoor& door) {
                                          "torque constant " + signal::with_error(constant) + " N m per unit"};
   found.procedures.push_back(report);
   write_text(arguments.text("out"), text);
-  write_text(arguments.text("json"), door.with_findings(findings::identification_json(
-                                         found, arguments.text("rig"), arguments.positionals())));
+  write_text(json_beside_out(arguments), door.with_findings(findings::identification_json(
+                                             found, arguments.text("rig"), arguments.positionals())));
   findings::print_summary(found, std::cout);
   return fit.contradictions.empty() ? kHealthy : kInconclusive;
 }
