@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
 #include "backlash_diagnosis/model/term_text.h"
+#include "backlash_diagnosis/model/weight_term.h"
 #include "backlash_diagnosis/rig_file/known_values.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
@@ -29,8 +30,8 @@ void replace_weight(rig_file::RigDocument& document, const Identification& found
   const auto amplitude = found.parameters.find("gravity_amplitude");
   if (amplitude == found.parameters.end() || std::isinf(amplitude->second.standard_error)) return;
   for (const auto& term : found.rig.terms)
-    if (term->id == "gravity")
-      document.replace_terms([](const std::string& id) { return id == "gravity"; },
+    if (term->id == model::weight_term())
+      document.replace_terms([](const std::string& id) { return id == model::weight_term(); },
                              {model::term_text(*term)});
 }
 

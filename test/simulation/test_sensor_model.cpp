@@ -244,6 +244,11 @@ TEST(SensorsSettings, ReadsEveryValue) {
   EXPECT_EQ(settings.of(record::Channel::load_position).limit, std::numeric_limits<double>::infinity());
 }
 
+TEST(SensorsSettings, NoiseNeedsASeed) {
+  EXPECT_NO_THROW(SensorModel(read("sampling_rate: 1000\nsensor_torque: {offset: 0.01}\n")));
+  EXPECT_THROW(SensorModel(read("sampling_rate: 1000\nsensor_torque: {noise: 0.01}\n")), InvalidParameter);
+}
+
 TEST(SensorsSettings, RefusalNamesFileLineKeyValueAndLimit) {
   const struct {
     const char* text;
@@ -252,7 +257,6 @@ TEST(SensorsSettings, RefusalNamesFileLineKeyValueAndLimit) {
       {"seed: 1\n", "rig.yaml:1: sampling_rate: is missing, expected a number"},
       {"sampling_rate: 0\nseed: 1\n", "rig.yaml:1: sampling_rate = 0: must be > 0"},
       {"sampling_rate: 1 kHz\nseed: 1\n", "rig.yaml:1: sampling_rate = 1 kHz: not a number"},
-      {"sampling_rate: 1000\n", "rig.yaml:1: seed: is missing, expected an integer"},
       {"sampling_rate: 1000\nseed: -1\n", "rig.yaml:2: seed = -1: must be >= 0"},
       {"sampling_rate: 1000\nseed: 1.5\n", "rig.yaml:2: seed = 1.5: must be an integer"},
       {"sampling_rate: 1\nseed: 1\nsensor_torque: 0.002\n",

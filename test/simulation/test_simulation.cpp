@@ -196,9 +196,14 @@ TEST(SimulationSettings, ShippedFileIsReadAndASolverMayBeLeftOut) {
       YamlReader::from_text("excitation: {type: topic}\nsensors: {sampling_rate: 10, seed: 0}\n", "t");
   EXPECT_EQ(read_simulation_settings(yaml).solver.relative_tolerance, 1e-6);
   EXPECT_NO_THROW(yaml.finish());
-  EXPECT_THROW(read_simulation_settings(YamlReader::from_text("sensors: {sampling_rate: 10, seed: 0}", "t")),
-               BadData);
-  EXPECT_THROW(read_simulation_settings(YamlReader::from_text("excitation: {type: topic}", "t")), BadData);
+}
+
+/// A diagnosis needs neither; what simulates asks for both.
+TEST(SimulationSettings, WithoutExcitationOrSensorsNothingIsSimulated) {
+  for (const char* text : {"sensors: {sampling_rate: 10, seed: 0}", "excitation: {type: topic}"}) {
+    const SimulationSettings settings = read_simulation_settings(YamlReader::from_text(text, "t"));
+    EXPECT_THROW(Simulation(test::sarkar_rig(30e-6), settings), InvalidParameter) << text;
+  }
 }
 
 // Records of the same rig by a separate program: sensor noise 0.002 N m, position noise 1e-6 rad.

@@ -13,6 +13,7 @@
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/model/term.h"
+#include "backlash_diagnosis/model/weight_term.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
@@ -91,13 +92,11 @@ void take_off_terms(IdentificationCase& c) {
   }
 }
 
-constexpr char kGravity[] = "gravity";
-
 /// The weight that the rig declares, in sine and cosine; none where it declares no gravity.
 std::optional<std::pair<double, double>> declared_weight(const model::Rig& rig) {
   std::optional<std::pair<double, double>> weight;
   for (const auto& term : rig.terms) {
-    if (term->id != kGravity) continue;
+    if (term->id != model::weight_term()) continue;
     if (!weight) weight.emplace(0, 0);
     const double amplitude = term->values.at("amplitude"), phase = term->values.at("phase");
     weight->first += amplitude * std::cos(phase);
@@ -187,11 +186,12 @@ std::optional<SeveralMachines> contradicting(const std::vector<Told>& told, cons
 void take_weight(const OneInertia& found, IdentificationCase& c) {
   if (!found.gravity) return;
   auto& terms = c.result.rig.terms;
-  terms.erase(
-      std::remove_if(terms.begin(), terms.end(), [](const auto& term) { return term->id == kGravity; }),
-      terms.end());
+  terms.erase(std::remove_if(terms.begin(), terms.end(),
+                             [](const auto& term) { return term->id == model::weight_term(); }),
+              terms.end());
   const auto [amplitude, phase] = weight_of(found);
-  terms.push_back(model::make_term(kGravity, {{"amplitude", amplitude.value}, {"phase", phase.value}}));
+  terms.push_back(
+      model::make_term(model::weight_term(), {{"amplitude", amplitude.value}, {"phase", phase.value}}));
 }
 
 /// The values of the rig that one inertia has.

@@ -4,6 +4,7 @@
 // Sarkar, Ellis and Moore (1997), Table 1 (m_L d_L sin(theta_L) g).
 #include <cmath>
 
+#include "backlash_diagnosis/model/weight_term.h"
 #include "search_values.h"
 #include "terms.h"
 
@@ -23,8 +24,13 @@ class Gravity : public Term {
 
 }  // namespace
 
+const std::string& weight_term() {
+  static const std::string id = "gravity";
+  return id;
+}
+
 TermType gravity_term() {
-  return {"gravity",
+  return {weight_term(),
           {{"amplitude", "N m", Range::not_negative(), "A"}, {"phase", "rad", Range::any(), "p"}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<Gravity>(p.at("amplitude"), p.at("phase"));

@@ -17,6 +17,7 @@
 #include "backlash_diagnosis/findings/identification_report.h"
 #include "backlash_diagnosis/identification/fitted_rig.h"
 #include "backlash_diagnosis/model/term_text.h"
+#include "backlash_diagnosis/model/weight_term.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
 #include "backlash_diagnosis/signal/measured_text.h"
 #include "backlash_diagnosis/signal/weighted_mean.h"
@@ -155,10 +156,12 @@ std::string fitted_text(const rig_file::RigFile& file, const identification::Ide
       fmt::format("N m per unit of motor_torque, +- {:.2g}, by a known weight: all else here is per unit",
                   constant.standard_error));
   const bool declared = std::any_of(file.rig.terms.begin(), file.rig.terms.end(),
-                                    [](const auto& t) { return t->id == "gravity"; });
-  const auto term = model::make_term("gravity", {{"amplitude", gravity.first}, {"phase", gravity.second}});
+                                    [](const auto& t) { return t->id == model::weight_term(); });
+  const auto term =
+      model::make_term(model::weight_term(), {{"amplitude", gravity.first}, {"phase", gravity.second}});
   if (declared)
-    document.replace_terms([](const std::string& id) { return id == "gravity"; }, {model::term_text(*term)});
+    document.replace_terms([](const std::string& id) { return id == model::weight_term(); },
+                           {model::term_text(*term)});
   else
     document.append_terms({model::term_text(*term)}, "identified");
   document.read();
