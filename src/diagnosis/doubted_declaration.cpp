@@ -12,7 +12,7 @@ namespace {
 constexpr double kTimes = 2;
 
 bool contradicts_the_file(const Estimate& e) {
-  return e.waveform && e.status == Status::out_of_domain;
+  return e.waveform && (e.status == Status::out_of_domain || e.must_hold);
 }
 
 void widen(Estimate& e) {

@@ -198,6 +198,7 @@ void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settin
   if (settings.angular) e.backlash = e.lower = e.upper = kNaN;
   if (!s.position()) e.declared = ends.of_file / per_angle;  // nearly all of it, by the symmetry
   e.from_record = e.fits_machine = true;
+  e.must_hold = s.lacking;  // the other methods take the machine of the file
   e.declared_wrong = contradicted(s, settings);
   e.message = message_of(s, e.declared_wrong);
   e.status = some ? Status::ok : Status::below_range;
