@@ -94,7 +94,7 @@ TEST_F(Commands, UsageErrorsEndWith64AndPointToHelp) {
            curve + "--seeds none",
            curve + "--plot c.txt",
            "build_curve rig.yaml --out rig.yaml",
-           "diagnose_record a.csv",
+           "diagnose_record --json -",
            "diagnose_record a.txt --json -",
            "diagnose_record a.csv --json a.csv",
            "diagnose_record a.csv --json - --method guess",
