@@ -230,7 +230,7 @@ TEST_F(Identify, Refusals) {
   const std::string rest = " --rig servo.yaml --out fit.yaml --json fit.json";
   EXPECT_EQ(run("identify" + rest).code, 64);
   EXPECT_EQ(run("identify run.txt" + rest).code, 64);
-  EXPECT_EQ(run("identify run.csv --rig servo.yaml --out fit.yaml").code, 64);
+  EXPECT_EQ(run("identify run.csv --rig servo.yaml").code, 64);
   EXPECT_EQ(run("identify run.csv --rig servo.yaml --out run.csv --json fit.json").code, 64);
   EXPECT_EQ(run("identify run.csv --rig servo.yaml --out x.yaml --json x.yaml").code, 64);
   EXPECT_EQ(run("identify none.csv" + rest).code, 66);
