@@ -20,7 +20,7 @@ shift $(($# > 0))
 install_dependencies run
 echo "Building in ${WS}"
 build
-build "${PACKAGE}_test_machine"
+build "${PACKAGE}_test_machine" "${PACKAGE}_test_robot_joint"
 executables=${WS}/devel/lib/${PACKAGE}
 python3 "${REPO}/test/campaigns/confusion_table.py" --trace "${executables}/trace_residual" \
   --make "${executables}/make_machine" --keep "${out}" "$@"

@@ -26,7 +26,7 @@ constexpr double kErrorsAlone =
 // The gates, but for the noise of a sampled torque (waveform_solution.cpp).
 constexpr double kMostLeft = 0.05;    // of the swing of a channel, that is no noise: choice
 constexpr double kMostLeftOut = 0.5;  // of the windows: choice
-constexpr double kFarthest = 4;       // spreads, of an inertia or the sensor's stiffness: choice
+constexpr double kFarthest = 4;       // spreads, of an inertia or a stiffness: choice
 constexpr double kVague = 4;      // upper over lower end of an interval, by which it says too little: choice
 constexpr double kRivalCost = 9;  // chi^2 of three standard errors: theory
 // What the message tells of the file: values beyond what it says of them, one spread, and surely so, as the
@@ -90,7 +90,7 @@ void refuse_waveform(const WaveformSolution& s) {
           fmt::format("the machine of the rig file, whatever its values and what it may lack, does not "
                       "explain the {}: {:.2g} % of its swing are left that are no noise",
                       kNames[c], 100 * left)};
-  for (const int k : {kSensorStiffness, kMotorInertia, kPinionInertia, kGearInertia})
+  for (const int k : {kSensorStiffness, kMotorInertia, kPinionInertia, kGearInertia, kOutputStiffness})
     if (const double away = deviations(s, std::size_t(k)); away > kFarthest)
       throw Refusal{
           Status::out_of_domain,

@@ -3,7 +3,8 @@
 """Runs trace_residual on machines that it has never seen and says how often it names what they lack.
 
 Makes a seeded suite of machines with make_machine (servos with one, two, three or no undeclared effects, and effects
-that no dictionary holds, clean and with 20 % torque noise; joints with one encoder in a position loop), runs trace_residual on each and compares what it adds with the
+that no dictionary holds, clean and with 20 % torque noise; joints with one encoder in a position loop; joints of a
+robot's size with two), runs trace_residual on each and compares what it adds with the
 truth. Prints a line per machine, the confusion table and the totals against the goals, and writes all as JSON.
 Exit code: 0 where every goal is met, 1 where not, 64 usage, 66 executable missing.
 """
@@ -60,7 +61,10 @@ JOINTS = ["none"] * 4 + ["gravity,load_dependent_friction"] * 6 + [
     "outside_torque", "gravity,outside_torque", "wandering_torque", "gravity,wandering_torque", "friction_swing",
     "gravity,friction_swing", "payload_step", "gravity,payload_step"]
 RIGS = {"servo": "config/two_inertia_servo.yaml", "joint": "config/ur10e_joint.yaml"}
-GROUPS = ("clean", "noisy", "joint")
+# Joints of a robot's size with two encoders, recorded as by ROS, by make_robot_joint; twice each.
+ROBOTS = ["none", "cogging", "stribeck", "load_dependent_friction", "position_dependent_friction", "transmission_error",
+          "varying_backlash", "gravity", "asymmetric_coulomb"]
+GROUPS = ("clean", "noisy", "joint", "robot")
 
 Case = collections.namedtuple("Case", "name effects options group")
 
@@ -90,6 +94,10 @@ def suite(first_seed):
         add(effects, options, "clean")
     for effects in JOINTS:
         add(effects, [], "joint")
+    for effect in ROBOTS + ROBOTS:
+        seed = first_seed + len(cases)
+        cases.append(Case(f"{len(cases):03d}_robot_{effect}", effect,
+                          ["--seed", str(seed), "--effect", effect, "--duration", "18"], "robot"))
     return cases
 
 
@@ -122,7 +130,8 @@ def trace(folder, tracer, rig, timeout):
     done = folder / "run.json"
     if done.is_file():
         return json.loads(done.read_text())
-    command = [tracer, "--rig", rig, "--train", str(folder / "train.csv"), "--test", str(folder / "test.csv"),
+    train, test = ("m0.csv", "m1.csv") if (folder / "m0.csv").is_file() else ("train.csv", "test.csv")
+    command = [tracer, "--rig", rig, "--train", str(folder / train), "--test", str(folder / test),
                "--out", str(folder / "report")]
     started = time.monotonic()
     try:
@@ -186,8 +195,10 @@ def judge(case, truth, outcome, report):
 
 def run_case(case, args):
     folder = args.folder / case.name
-    make(case, folder, args.make)
-    outcome = trace(folder, args.trace, str(args.rigs["joint" if case.group == "joint" else "servo"]), args.timeout)
+    robot = case.group == "robot"
+    make(case, folder, str(Path(args.make).with_name("make_robot_joint")) if robot else args.make)
+    rig = folder / "rig.yaml" if robot else args.rigs["joint" if case.group == "joint" else "servo"]
+    outcome = trace(folder, args.trace, str(rig), args.timeout)
     report = None
     if outcome["code"] in RESULT_CODES:
         report = json.loads((folder / "report" / "report.json").read_text())

@@ -199,6 +199,9 @@ struct TermType {
   GapVariation gap_variation = GapVariation::none;
   // How friction builds up after a reversal. Every machine's does: it is called missing only where it shows.
   bool shapes_friction = false;
+  // What every machine has some of: up to these shares of the motor's dry friction and of the backlash angle
+  // its strength is in the model and not called missing.
+  double usual_of_friction = 0, usual_of_gap = 0;
   // Beside the declared contact law it does what another law would do alone.
   bool stands_in_for_contact_law = false;
 };

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "backlash_diagnosis/simulation/driven_load.h"
 #include "effect_roles.h"
 #include "found_effects.h"
 #include "local_strength.h"
@@ -109,24 +110,29 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
                                                                 const SearchContext& context) {
   const BeliefSettings& settings = context.settings.belief;
   auto all = strengths(h);
+  const auto belongs_to_machine = [&](std::size_t i) {
+    return simulation::load_moves_freely(h.declared->rig) &&
+           is_usual(h.effects[i].candidate, h.declared->rig);
+  };
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (is_delay(h.effects[i].candidate.id))
       for (signal::Measured& m : all[i]) m = beyond_hold(m, context);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
-    if (is_vague(all[i], settings.least_z))
+    if (!belongs_to_machine(i) && is_vague(all[i], settings.least_z))
       return std::pair{i, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};
   for (std::size_t i = 0; i < h.effects.size(); ++i)
-    if (std::string why = weak_where_it_acts(h, i, all[i], settings); !why.empty())
+    if (std::string why = weak_where_it_acts(h, i, all[i], settings); !belongs_to_machine(i) && !why.empty())
       return std::pair{i, std::move(why)};
   const StrengthInParts parts(h, unseen, context);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
-    if (std::string why = other_in_a_part(parts, i); !why.empty()) return std::pair{i, std::move(why)};
+    if (std::string why = other_in_a_part(parts, i); !belongs_to_machine(i) && !why.empty())
+      return std::pair{i, std::move(why)};
   const std::vector<ServoPrediction> on_unseen = predicted_by_all(h, unseen, context.settings.fit);
   for (std::size_t i = 0; i < h.effects.size(); ++i) {
     const Effect& effect = h.effects[i];
     std::string why = contradicted(on_unseen[i], on_unseen[i + 1], effect.gain.deflection,
                                    is_learned(effect.candidate.id), settings);
-    if (!why.empty()) return std::pair{i, std::move(why)};
+    if (!belongs_to_machine(i) && !why.empty()) return std::pair{i, std::move(why)};
   }
   return std::nullopt;
 }

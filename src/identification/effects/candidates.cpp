@@ -92,17 +92,12 @@ struct Probed {
   Candidate alone = {};
 };
 
-void probe(Probed& p, const MachineFit& fit, const RecordSet& records, const OrthogonalPart& orthogonal,
-           const Eigen::VectorXd& now, double telling) {
+void probe(Probed& p, const ColumnOf& column) {
   const std::vector<ParameterValues> all = probes(*p.type, p.shape, p.strength);
-  p.columns.resize(now.size(), Eigen::Index(all.size()));
   for (std::size_t i = 0; i < all.size(); ++i) {
-    model::Rig rig = fit.machine.rig;
-    rig.terms.push_back(model::make_term(p.type->id, all[i]));
-    const Eigen::VectorXd change = records.rows(rig, fit.machine.calibrations) - now;
-    Eigen::VectorXd left = orthogonal.of(change);
-    if (left.norm() < telling * change.norm() || change.norm() == 0) left.setZero();
-    p.columns.col(Eigen::Index(i)) = left;
+    const Eigen::VectorXd own = column(*model::make_term(p.type->id, all[i]));
+    if (i == 0) p.columns.resize(own.size(), Eigen::Index(all.size()));
+    p.columns.col(Eigen::Index(i)) = own;
   }
 }
 
@@ -209,17 +204,31 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
                               const model::MotionRange& range, const ScreenSettings& settings) {
   const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
   const OrthogonalPart orthogonal(fit, now.size());
-  const Eigen::VectorXd& left = orthogonal.residuals();
+  const auto column = [&](const model::Term& term) {
+    model::Rig rig = fit.machine.rig;
+    rig.terms.push_back(model::make_term(term.id, term.values));
+    const Eigen::VectorXd change = records.rows(rig, fit.machine.calibrations) - now;
+    Eigen::VectorXd left = orthogonal.of(change);
+    if (left.norm() < settings.telling * change.norm() || change.norm() == 0) left.setZero();
+    return left;
+  };
+  return screen(fit, records, range, settings, orthogonal.residuals(), column);
+}
+
+std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
+                              const model::MotionRange& range, const ScreenSettings& settings,
+                              const Eigen::VectorXd& left, const ColumnOf& column) {
+  const OrthogonalPart orthogonal(fit, Eigen::Index(records.layout().size()));
   std::vector<Probed> all =
       all_probes(fit.machine.rig, range, ResidualOrders(fit, records, orthogonal), settings);
   for_each_in_parallel(int(all.size()), [&](int i) {
     Probed& p = all[std::size_t(i)];
     try {
-      probe(p, fit, records, orthogonal, now, settings.telling);
+      probe(p, column);
     } catch (const Cancelled&) {
       throw;
     } catch (const Error&) {  // a load that runs away with it: no candidate
-      p.columns.setZero(now.size(), 1);
+      p.columns.setZero(left.size(), 1);
     }
     p.alone = single(p, left);
     if (!p.type->search->pairs) p.columns.resize(0, 0);
@@ -237,6 +246,15 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   return sorted;
+}
+
+std::vector<std::shared_ptr<const model::Term>> probed_terms(const Candidate& candidate) {
+  const model::TermType& type = model::term_type(candidate.id);
+  std::vector<std::shared_ptr<const model::Term>> all;
+  for (const ParameterValues& values : candidate.terms)
+    for (const ParameterValues& p : probes(type, values, values.at(type.search->strength)))
+      all.push_back(model::make_term(candidate.id, p));
+  return all;
 }
 
 std::vector<const model::TermShape*> fitted_shapes(const Candidate& candidate, std::size_t term) {

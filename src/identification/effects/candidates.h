@@ -2,6 +2,8 @@
 // What the search tries: terms of the registry with values, and how much each would explain.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -29,6 +31,15 @@ std::vector<const model::TermShape*> fitted_shapes(const Candidate& candidate, s
 /// What a change of the fitted parameters explains is not counted as a gain of a candidate.
 std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
                               const model::MotionRange& range, const ScreenSettings& settings);
+
+/// What a term changes of residuals, less what the fitted parameters explain as well.
+using ColumnOf = std::function<Eigen::VectorXd(const model::Term&)>;
+/// The same of other residuals, `left`, with their own sensitivities. `fit` and `records` show the orders.
+std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
+                              const model::MotionRange& range, const ScreenSettings& settings,
+                              const Eigen::VectorXd& left, const ColumnOf& column);
+/// All terms of a candidate, one that has a phase as sine and cosine.
+std::vector<std::shared_ptr<const model::Term>> probed_terms(const Candidate& candidate);
 
 /// The machine with this candidate's terms, whose strengths, phases and refined shapes are fitted as well.
 Machine with_candidate(Machine machine, const Candidate& candidate, const model::MotionRange& range);

@@ -17,6 +17,7 @@
 #include "impossible_friction.h"
 #include "search.h"
 #include "signature.h"
+#include "steps.h"
 #include "traced_records.h"
 #include "unseen_record.h"
 
@@ -42,6 +43,24 @@ void note_shape_of_friction(const Hypothesis& h, double least, Trace& trace) {
   trace.notes.push_back(note);
   trace.rejected.push_back({at->id, "too small to be called missing, see the notes"});
   trace.steps.erase(at);
+}
+
+/// What every machine has some of is in the model, and called missing only where it is more than usual.
+void note_usual_effects(const Hypothesis& h, Trace& trace) {
+  if (!simulation::load_moves_freely(h.declared->rig)) return;
+  for (const Effect& effect : h.effects) {
+    const auto at = std::find_if(trace.steps.begin(), trace.steps.end(),
+                                 [&](const FoundEffect& e) { return e.id == effect.candidate.id; });
+    if (at == trace.steps.end() || !is_usual(effect.candidate, h.declared->rig)) continue;
+    std::string note = at->id + " (";
+    for (const EffectParameter& p : at->parameters)
+      note += fmt::format("{}{} {:.3g} +- {:.2g} {}", &p == &at->parameters.front() ? "" : ", ", p.name,
+                          p.measured.value, p.measured.standard_error,
+                          model::axis_unit(p.unit, trace.augmented.linear));
+    trace.notes.push_back(note + ") is in the model but not called missing: every machine has as much");
+    trace.rejected.push_back({at->id, "no more than every machine has, see the notes"});
+    trace.steps.erase(at);
+  }
 }
 
 struct Records {
@@ -268,6 +287,7 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
       found,
       simulation::load_moves_freely(declared) ? settings.shape_of_friction : settings.shape_of_all_torque,
       trace);
+  note_usual_effects(found, trace);
   judge_remainder(remainders(result, on_test.back(), records, settings, trace), found, records.test, settings,
                   trace);
   if (shows_nothing(trace))

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../fit/calibration.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/record/encoder_skew.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
@@ -72,6 +73,9 @@ Hypothesis fit_declared(const model::Rig& declared, const SearchContext& context
   machine.rig = declared;
   machine.calibrations.resize(context.data.size());
   if (declared.link_locked) start_in_travel(machine, context.data);
+  if (simulation::load_moves_freely(declared))
+    for (std::size_t i = 0; i < context.data.size(); ++i)
+      machine.calibrations[i].encoder_offset = middle_offset(context.data[i]);
   start_with_skew(machine, context.data);
   machine.parameters = declared_parameters(machine.rig);
   if (declared.coupled) machine.priors = rows_as_declared(declared);

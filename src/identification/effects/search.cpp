@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "backlash_diagnosis/base/interruption.h"
 #include "steps.h"
@@ -57,10 +58,24 @@ Hypothesis believe_physical(const Hypothesis& before, const ServoData& unseen, c
 
 /// Together, and with friction held at zero, they may tell less than each did.
 Hypothesis believe_all(const Hypothesis& before, const Hypothesis& declared, const ServoData& unseen,
-                       const SearchContext& context) {
+                       bool own_channels, const SearchContext& context) {
   const Hypothesis h = believe_physical(before, unseen, context),
-                   together = believe_together(h, declared, unseen, context);
+                   together = believe_together(h, declared, unseen, own_channels, context);
   return together.fitted == h.fitted ? h : believe_physical(together, unseen, context);
+}
+
+/// What two encoders show plainly, where the unseen record bears all of it out, or one that has a name.
+std::optional<Hypothesis> plain_effects(const Hypothesis& declared, const ServoData& unseen,
+                                        const SearchContext& context) {
+  Hypothesis h = add_plain_effects(declared, context);
+  const std::size_t count = h.effects.size();
+  if (count == 0) return std::nullopt;
+  h = believe_all(add_shape_of_friction(h, context), declared, unseen, true, context);
+  const bool named = std::any_of(h.effects.begin(), h.effects.end(), [&](const Effect& effect) {
+    return !is_usual(effect.candidate, h.declared->rig);
+  });
+  if (named || h.effects.size() >= count) return h;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -78,13 +93,17 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
     result.found = believe_compliance(result.declared, unseen, context);
     return result;
   }
+  if (const auto plain = plain_effects(result.declared, unseen, context)) {
+    result.found = *plain;
+    return result;
+  }
   Hypothesis h = add_effects_or_teeth(result.declared, context);
   h = drop_superfluous(h, context);
   h = reconsider(h, context);
   h = try_equivalents(h, context);
   h = add_learned(h, context);
   h = drop_stand_ins(h, context);
-  result.found = believe_all(h, result.declared, unseen, context);
+  result.found = believe_all(h, result.declared, unseen, false, context);
   return result;
 }
 

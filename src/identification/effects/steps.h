@@ -13,6 +13,16 @@ Hypothesis fit_declared(const model::Rig& declared, const SearchContext& context
 /// The parameters that the rig declares and such records can tell.
 std::vector<FitParameter> declared_parameters(const model::Rig& rig);
 
+/// Of a term that every machine has some of, the largest strength that is usual (model/term.h); 0: none is.
+double usual_strength(const model::TermType& type, const model::Rig& rig);
+bool is_usual(const Candidate& candidate, const model::Rig& rig);
+/// How friction builds up after a reversal, where that is usual and lessens what is left.
+Hypothesis add_shape_of_friction(const Hypothesis& h, const SearchContext& context);
+
+/// Named effects that two encoders show plainly, each in turn by that which explains most; none of a machine
+/// with one.
+Hypothesis add_plain_effects(const Hypothesis& h, const SearchContext& context);
+
 /// One more named effect: the first of the best trials that convinces and that the machine can be fitted
 /// with.
 Hypothesis add_effect(const Hypothesis& h, const SearchContext& context);
@@ -55,9 +65,9 @@ Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
 Hypothesis believe(const Hypothesis& h, const ServoData& unseen, const SearchContext& context);
 
 /// The declared machine without effects where those that are believed one by one do not tell more of the
-/// unseen record together.
+/// unseen record together: of the channels that they are seen in (own_channels), or of both.
 Hypothesis believe_together(const Hypothesis& h, const Hypothesis& declared, const ServoData& unseen,
-                            const SearchContext& context);
+                            bool own_channels, const SearchContext& context);
 
 /// Of a machine that is coupled to other axes: with stiff teeth, unless the unseen record bears their
 /// compliance out.

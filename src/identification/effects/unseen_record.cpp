@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "../fit/calibration.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "independence.h"
 
@@ -32,7 +33,8 @@ Calibration calibrated(Machine machine, const ServoData& record, const FitSettin
       machine = fit_in_band(data, machine, band, settings.tolerance, settings).fit.machine;
     }
   };
-  if (simulation::load_moves_freely(machine.rig)) {  // else the torque alone tells where the gap is
+  if (simulation::load_moves_freely(machine.rig)) {  // else the torque alone shows where the gap is
+    machine.calibrations.front().encoder_offset = middle_offset(record);
     const double delay = std::exchange(machine.largest_delay, 0);
     machine.deflection_only = true;
     calibrate();

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/model/term.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash::identification {
 namespace {
@@ -37,6 +38,12 @@ void limit_delay(Machine& machine, double longest) {
     if (std::fabs(c.torque_delay) > longest) machine.largest_delay = 0;
     c.torque_delay = std::clamp(c.torque_delay, -longest, longest);
   }
+}
+
+double middle_offset(const ServoData& record) {
+  std::vector<double> offsets(record.size());
+  for (std::size_t k = 0; k < record.size(); ++k) offsets[k] = record.load[k] - record.motor[k];
+  return signal::median(std::move(offsets));
 }
 
 void without_calibration(Machine& machine) {

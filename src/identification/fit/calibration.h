@@ -16,6 +16,10 @@ void restore_hold(Machine& machine);
 /// shows as an effect.
 void limit_delay(Machine& machine, double longest);
 
+/// rad: the encoders' offset at which the load is, in the median, where the motor is. Each record has its
+/// own, for an encoder that counts finds its zero anew whenever the robot is switched on.
+double middle_offset(const ServoData& record);
+
 /// No delay by calibration, where a term of the model is the delay.
 void without_calibration(Machine& machine);
 

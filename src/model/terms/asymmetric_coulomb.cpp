@@ -26,12 +26,15 @@ class AsymmetricCoulomb : public EndFrictionTerm {
 }  // namespace
 
 TermType asymmetric_coulomb_term() {
-  return {"asymmetric_coulomb",
-          {body_parameter(), {"torque", "N m", Range::any(), "b, half the difference of the directions"}},
-          [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            return std::make_unique<AsymmetricCoulomb>(p);
-          },
-          TermSearch{"torque", "", clear_torque, {}}};
+  TermType type{
+      "asymmetric_coulomb",
+      {body_parameter(), {"torque", "N m", Range::any(), "b, half the difference of the directions"}},
+      [](const ParameterValues& p) -> std::unique_ptr<Term> {
+        return std::make_unique<AsymmetricCoulomb>(p);
+      },
+      TermSearch{"torque", "", clear_torque, {}}};
+  type.usual_of_friction = 0.1;  // choice: the zero of a torque that is taken from a current looks the same
+  return type;
 }
 
 }  // namespace backlash::model

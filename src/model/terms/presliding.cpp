@@ -51,6 +51,7 @@ TermType presliding_term() {
                 },
                 TermSearch{"distance", "", typical, {{"damping", dampings, true}}}};
   type.shapes_friction = true;
+  type.usual_of_gap = 1;  // choice: bristles are shorter than the play; a path beyond it is a soft part
   return type;
 }
 

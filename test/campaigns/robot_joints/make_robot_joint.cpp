@@ -2,11 +2,13 @@
 // Makes one joint: OUT/m0.csv and m1.csv, rig.yaml, truth.json.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/program_options.hpp>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "robot_joint.h"
 
@@ -46,6 +48,13 @@ std::string truth(const Machine& m, const std::vector<std::pair<std::string, Run
                {"friction", m.bristles ? "lugre" : "coulomb"},
                {"skew", m.skew},
                {"eccentricity", m.eccentricity}};
+  if (const Effect& e = m.effect; !e.id.empty()) {
+    json["undeclared_effects"] = Json::object();
+    if (e.id != "none")
+      json["undeclared_effects"][e.id] = {
+          {"size", e.size}, {"order", e.order}, {"speed", e.speed}, {"phase", e.phase}};
+    json["outside_dictionary"] = Json::array();
+  }
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const Run& run = runs[i].second;
     json["motions"][fmt::format("m{}", i)] = {{"kind", runs[i].first},
@@ -115,9 +124,16 @@ diagnosis:
 
 namespace {
 
-void make(std::uint64_t seed, double duration, const std::filesystem::path& out) {
+void make(std::uint64_t seed, const std::string& effect, double duration, const std::filesystem::path& out) {
   Random machine_stream(seed, "machine");
-  const Machine machine = draw_machine(machine_stream);
+  Machine machine = draw_machine(machine_stream);
+  if (!effect.empty()) {
+    const auto& ids = effect_ids();
+    if (std::find(ids.begin(), ids.end(), effect) == ids.end())
+      throw std::invalid_argument(fmt::format("effect {} is none of {}", effect, fmt::join(ids, " ")));
+    Random effect_stream(seed, "effect");
+    machine = with_effect(machine, effect, effect_stream);
+  }
   std::filesystem::create_directories(out);
   std::vector<std::pair<std::string, Run>> runs;
   for (int i = 0; i < 2; ++i) {
@@ -139,9 +155,11 @@ int main(int argc, char** argv) {
   po::options_description options("make_robot_joint: two records of a robot's joint with truth");
   std::uint64_t seed = 1;
   double duration = 25;
-  std::string out;
+  std::string out, effect;
   options.add_options()("help,h", "this text")("seed", po::value(&seed)->required(),
                                                "of the machine and its motions")(
+      "effect", po::value(&effect),
+      "one that the rig file does not know, on a joint with mild errors of its sensors")(
       "duration", po::value(&duration)->default_value(25), "of a record [s]")(
       "out", po::value(&out)->required(), "folder for m0.csv, m1.csv, rig.yaml, truth.json");
   try {
@@ -152,7 +170,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     po::notify(given);
-    robot_joints::make(seed, duration, out);
+    robot_joints::make(seed, effect, duration, out);
     return 0;
   } catch (const po::error& error) {
     std::cerr << "make_robot_joint: " << error.what() << '\n';

@@ -101,14 +101,16 @@ class Plant {
   void start(double q) { qm = qw = ql = q; }
 
   void step(double torque) {
-    through = teeth(qm - qw, wm - ww);
+    through = teeth(qm - qw - wave("transmission_error"), wm - ww);
     const double s = shaft_ * (qw - ql) + 2 * 0.02 * std::sqrt(shaft_ * wheel_) * (ww - wl);
     const double cogging = m_.cogging * std::sin(m_.cogging_order * qm);
-    wm += kStep / v_.motor_inertia * (torque - motor_friction() - v_.motor_viscous * wm - cogging - through);
+    wm += kStep / v_.motor_inertia *
+          (torque - motor_friction() - v_.motor_viscous * wm - cogging - undeclared() - through);
     ww += kStep / wheel_ * (through - s);
     wl += kStep / load_ *
           (s - v_.load_viscous * wl - v_.load_coulomb * std::clamp(wl / kBuildUp, -1.0, 1.0) -
-           v_.gravity * std::sin(ql + v_.gravity_phase));
+           v_.gravity * std::sin(ql + v_.gravity_phase) -
+           (is("gravity") ? m_.effect.size * std::sin(ql + m_.effect.phase) : 0));
     qm += kStep * wm, qw += kStep * ww, ql += kStep * wl;
   }
 
@@ -120,8 +122,24 @@ class Plant {
     return v_.motor_coulomb * stribeck * bristle_;
   }
 
+  bool is(const char* id) const { return m_.effect.id == id; }
+  double wave(const char* id) const {
+    return is(id) ? m_.effect.size * std::sin(m_.effect.order * qm + m_.effect.phase) : 0;
+  }
+
+  /// N m, on the motor.
+  double undeclared() const {
+    const double direction = std::clamp(wm / kBuildUp, -1.0, 1.0);
+    double friction = wave("position_dependent_friction");
+    if (is("stribeck")) friction = m_.effect.size * std::exp(-std::pow(wm / m_.effect.speed, 2));
+    if (is("load_dependent_friction")) friction = m_.effect.size * std::fabs(through);
+    if (is("asymmetric_coulomb")) return m_.effect.size * std::fabs(direction);
+    return wave("cogging") + friction * direction;
+  }
+
   double teeth(double x, double rate) const {
-    const double deep = std::fabs(x) - v_.backlash / 2, closing = x < 0 ? -rate : rate;
+    const double gap = v_.backlash * (1 + wave("varying_backlash"));
+    const double deep = std::fabs(x) - gap / 2, closing = x < 0 ? -rate : rate;
     if (deep <= 0) return 0;
     const double usual = m_.at / teeth_;  // rad
     double torque = teeth_ * deep;
@@ -217,6 +235,40 @@ Machine draw_machine(Random& random) {
   return m;
 }
 
+const std::vector<std::string>& effect_ids() {
+  static const std::vector<std::string> all = {"none",
+                                               "cogging",
+                                               "stribeck",
+                                               "load_dependent_friction",
+                                               "position_dependent_friction",
+                                               "transmission_error",
+                                               "varying_backlash",
+                                               "gravity",
+                                               "asymmetric_coulomb"};
+  return all;
+}
+
+Machine with_effect(Machine m, const std::string& id, Random& random) {
+  m.teeth = Teeth::linear, m.bristles = false;
+  m.cogging = m.offset = m.ripple = m.eccentricity = m.interpolation = m.lag = m.skew = 0, m.gain = 1;
+  m.declared.gravity = m.real.gravity = 0;
+  m.rate = 500;
+  const double orders[] = {2, 36, m.ratio, 2 * m.ratio};
+  Effect& e = m.effect;
+  m.zero = random.uniform(-0.01, 0.01);
+  e = {id, 0, orders[random.whole(1, 3)], random.uniform(0.03, 0.15), random.phase()};
+  if (id == "cogging") e.size = random.uniform(0.4, 1.2);
+  if (id == "stribeck") e.size = random.uniform(0.25, 0.7) * m.real.motor_coulomb;
+  if (id == "load_dependent_friction") e.size = random.uniform(0.08, 0.25);
+  if (id == "position_dependent_friction") e.size = random.uniform(0.2, 0.5) * m.real.motor_coulomb;
+  if (id == "transmission_error")
+    e.order = orders[random.whole(0, 2)], e.size = random.uniform(0.1, 0.5) * m.real.backlash;
+  if (id == "varying_backlash") e.size = random.uniform(0.2, 0.5);
+  if (id == "gravity") e.size = random.uniform(1.5, 8);
+  if (id == "asymmetric_coulomb") e.size = random.uniform(0.5, 2);
+  return m;
+}
+
 Run run(const Machine& m, const std::string& kind, double duration, Random& random) {
   const double torque = random.uniform(7, 22);
   const Motion motion = draw_motion(kind, random, duration, torque, m.real.load_inertia);
@@ -226,7 +278,9 @@ Run run(const Machine& m, const std::string& kind, double duration, Random& rand
   Run result;
   Count count;
   double asked = 0, given = 0, next = m.jitter / m.rate;
-  const double offset = random.uniform(0, 1);  // rad, between the encoders' zeros
+  const double other_zero =
+      random.uniform(0, 1);  // rad, where each record has its own: of a robot that was started again
+  const double zero = m.effect.id.empty() ? other_zero : m.zero;
   const long per_loop = std::lround(kLoop / kStep);
   const auto late = std::size_t(std::lround(m.skew / kStep));
   std::vector<double> loads;
@@ -247,7 +301,7 @@ Run run(const Machine& m, const std::string& kind, double duration, Random& rand
     if (random.chance(m.lost)) continue;
     const double q = loads[loads.size() - 1 - std::min(late, loads.size() - 1)];
     const double shown = q + m.eccentricity * std::sin(q + m.eccentricity_phase) +
-                         m.interpolation * std::sin(m.interpolation_order * q) + offset;
+                         m.interpolation * std::sin(m.interpolation_order * q) + zero;
     result.rows.push_back({time, rounded(m.gain * asked + m.offset + noise, m.step),
                            rounded(plant.qm, m.motor_resolution), rounded(shown, m.load_resolution)});
   }

@@ -24,6 +24,15 @@ struct Values {
 
 enum class Teeth { linear, hertz, cubic, hysteresis };
 
+/// One that the rig file does not know, "" for none; ids are the package's.
+struct Effect {
+  std::string id;
+  double size = 0;   // N m, rad, or a share: of the torque through the teeth, of the play
+  double order = 0;  // per turn of the load, of what comes again with a position
+  double speed = 0;  // rad/s, of Stribeck's friction
+  double phase = 0;  // rad
+};
+
 struct Machine {
   Values declared, real;
   double ratio = 100;
@@ -33,16 +42,23 @@ struct Machine {
   double hysteresis = 0;                  // -, share of the torque that the direction of the deflection takes
   bool bristles = false;                  // LuGre in place of Coulomb friction on the motor
   double cogging = 0, cogging_order = 0;  // N m, per turn of the load
+  Effect effect;
   // Sensors: torque from current, encoders.
   double gain = 1, offset = 0, ripple = 0, lag = 0, noise = 0, step = 0.05;  // -, N m, -, s, N m, N m
   double motor_resolution = 4.8e-7, load_resolution = 1.2e-5;                // rad
   double eccentricity = 0, eccentricity_phase = 0, interpolation = 0, interpolation_order = 512;  // rad
   double skew = 0;                     // s, the load encoder is late
+  double zero = 0;                     // rad, of the load's encoder against the motor's
   double jitter = 0.05, lost = 0.002;  // of an interval, of the samples
   double rate = 1000;                  // Hz
 };
 
 Machine draw_machine(Random& random);
+
+/// The same with linear teeth, Coulomb friction and mild errors of the sensors, and with an effect that its
+/// rig file does not know: one of effect_ids().
+Machine with_effect(Machine machine, const std::string& id, Random& random);
+const std::vector<std::string>& effect_ids();
 
 struct Row {
   double time, torque, motor, load;

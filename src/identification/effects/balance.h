@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What two encoders show of a geared machine without a simulation of its teeth: two sums, linear in all that
+// is sought, below the mesh resonance.
+//   whole train     tau = J_M a_M + J_L a_L + b w_M + F s_M - terms on either end
+//   pressed flank   q_M - q_L = zero + side g / 2 + T / k + skew w_L + shift of the flank by terms
+// s_M = +-1 is the direction of the motor; T = J_L a_L + b_L w_L + F_L s_M, with the values of a fit, is what
+// the teeth transmit; side is its sign. The first is Newton's law of both bodies together: it holds whatever
+// the teeth do, across the gap as well. Where dry friction may take any value (first sum) or no flank is
+// pressed (second) no sample counts, and none that the low-pass mixes with such a one.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "../fit/joint_fit.h"
+#include "backlash_diagnosis/model/term.h"
+
+namespace backlash::identification {
+
+class Balance {
+ public:
+  /// Of the machine with its terms. `data`: its records, which must outlive this. `cutoff` [Hz]: of the
+  /// low-pass of both sums.
+  Balance(const Machine& machine, const std::vector<ServoData>& data, double cutoff);
+
+  /// Measured minus what the machine's values and the strengths of its terms can explain, each channel in
+  /// units of its standard deviation.
+  const Eigen::VectorXd& left() const { return left_; }
+  /// Of what a term changes in both sums, in the same units, what the machine cannot explain as well; 0 where
+  /// that is less than `telling` of it.
+  Eigen::VectorXd column(const model::Term& term, double telling) const;
+
+  /// What columns explain of the channel of which they explain more, with the factors that the other blocks
+  /// of the records want, each block in turn.
+  struct HeldOut {
+    bool deflection = false;
+    double gain = 0;       // relative decrease of the norm of left()
+    int better = 0;        // blocks
+    double of_signal = 0;  // what is taken away, over the standard deviation of the channel
+  };
+  HeldOut held_out(const Eigen::MatrixXd& columns, int blocks) const;
+
+ private:
+  struct Sample {
+    model::Motion motion;
+    double direction = 0, side = 0;  // +1, -1, 0: neither
+  };
+  /// One record.
+  struct Part {
+    double interval = 0;
+    std::vector<Sample> samples;
+    std::vector<std::size_t> torque_rows, deflection_rows;  // samples that count
+  };
+  /// Both sums at all samples.
+  struct Sums {
+    std::vector<double> torque, deflection;  // N m, rad
+  };
+  Part part_of(const ServoData& data, const Calibration& calibration) const;
+  Sums sums_of(const model::Term& term, const Part& part) const;
+  Eigen::VectorXd rows(const std::vector<Sums>& of_parts) const;
+  Eigen::VectorXd rows_of(const model::Term& term) const;
+  std::vector<Eigen::VectorXd> base(const std::vector<ServoData>& data) const;
+  Eigen::VectorXd measured(const Machine& machine, const std::vector<ServoData>& data) const;
+  void scale(const Eigen::VectorXd& signal);
+
+  const model::Rig rig_;
+  const double cutoff_;
+  double load_inertia_, stiffness_;
+  std::vector<Part> parts_;
+  std::vector<char> deflection_;  // of each row, whether it is one
+  std::vector<double> time_;      // of each row, 0 to 1 in its record
+  Eigen::VectorXd weights_, left_;
+  double signal_[2] = {0, 0};  // of torque and deflection, in units of what is left
+  Eigen::MatrixXd basis_;
+};
+
+}  // namespace backlash::identification

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Effects that two encoders show plainly, without a simulation of the teeth (balance.h).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "backlash_diagnosis/simulation/driven_load.h"
+#include "balance.h"
+#include "effect_roles.h"
+#include "steps.h"
+
+namespace backlash::identification {
+namespace {
+
+struct Plain {
+  Candidate candidate;
+  Balance::HeldOut held_out;
+};
+
+/// Numbers that a fit of it has to find.
+std::size_t unknowns(const Candidate& c) {
+  return probed_terms(c).size() + c.terms.size() * model::term_type(c.id).search->shapes.size();
+}
+
+/// Those that convince in blocks that their size was not taken from, best first; of those that tie the
+/// simplest.
+std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& context) {
+  const SearchSettings& settings = context.settings;
+  const AcceptanceSettings& acceptance = settings.acceptance;
+  const Balance balance(h.fitted->fit.machine, context.data, settings.fit.rough_cutoff);
+  const auto column = [&](const model::Term& term) { return balance.column(term, settings.screen.telling); };
+  std::vector<Plain> all;
+  for (const Candidate& c :
+       screen(h.fitted->fit, h.fitted->records, context.range, settings.screen, balance.left(), column)) {
+    if (all.size() >= settings.trials.most) break;
+    const auto terms = probed_terms(c);
+    Eigen::MatrixXd columns(balance.left().size(), Eigen::Index(terms.size()));
+    for (std::size_t i = 0; i < terms.size(); ++i) columns.col(Eigen::Index(i)) = column(*terms[i]);
+    const Balance::HeldOut found = balance.held_out(columns, acceptance.blocks);
+    if (found.gain >= settings.asked.least_gain_unclear && found.of_signal >= acceptance.noise &&
+        found.better >= acceptance.most_blocks * acceptance.blocks)
+      all.push_back({c, found});
+  }
+  const auto tied = std::find_if(all.begin(), all.end(), [&](const Plain& p) {
+    return p.held_out.deflection != all.front().held_out.deflection ||
+           1 - p.held_out.gain > settings.revision.as_good * (1 - all.front().held_out.gain);
+  });
+  std::stable_sort(all.begin(), tied, [](const Plain& a, const Plain& b) {
+    return unknowns(a.candidate) < unknowns(b.candidate);
+  });
+  return all;
+}
+
+/// One of them, with the others that explain nearly as much of the same channel.
+Effect effect_of(const Plain& best, const std::vector<Plain>& plain, const SearchSettings& settings) {
+  Effect effect{best.candidate, {}, {}, {}, {}};
+  effect.gain.deflection = best.held_out.deflection;
+  effect.gain.evidence = {best.held_out.gain, best.held_out.gain, best.held_out.gain, best.held_out.better,
+                          settings.acceptance.blocks};
+  for (const Plain& other : plain)
+    if (other.candidate.id != best.candidate.id && other.held_out.deflection == best.held_out.deflection &&
+        other.held_out.gain >= settings.revision.alike * best.held_out.gain)
+      effect.alternatives.push_back(other.candidate);
+  return effect;
+}
+
+/// With the first, or with the same on another body where that, fitted with the machine, leaves less: both
+/// sums hardly show on which body a friction acts, and the motion of the load does.
+std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain>& plain,
+                                    const SearchContext& context) {
+  std::optional<Hypothesis> best;
+  for (const Plain& p : plain) {
+    if (p.candidate.id != plain.front().candidate.id) continue;
+    std::vector<Effect> effects = h.effects;
+    effects.push_back(effect_of(p, plain, context.settings));
+    auto with = refitted(h, std::move(effects), context);
+    if (with && (!best || size(*with) < size(*best))) best = std::move(with);
+  }
+  return best;
+}
+
+}  // namespace
+
+Hypothesis add_plain_effects(const Hypothesis& before, const SearchContext& context) {
+  Hypothesis h = before;
+  if (!simulation::load_moves_freely(h.declared->rig)) return h;
+  while (h.effects.size() < context.settings.asked.most_effects) {
+    context.tell("looking at the balance of torques and at the pressed flanks");
+    const std::vector<Plain> plain = plain_candidates(h, context);
+    if (plain.empty()) return h;
+    const auto with = with_best(h, plain, context);
+    if (!with) return h;
+    h = with_best_shapes(*with, context);
+  }
+  return h;
+}
+
+}  // namespace backlash::identification
