@@ -31,16 +31,14 @@ constexpr int kSearched = 16;    // windows of a first guess
 constexpr int kSearch = 20;      // steps of one
 constexpr double kGuesses[] = {0.3, 0.55, 1, 1.8, 3.3};  // times the declared gap
 constexpr double kShares[] = {0.3, 0.5, 0.7, 0.85, 1};   // of the range of motor minus load position
-constexpr double kBounces[] = {-1.5, 0,
-                               1.5};      // spreads of the damping: bouncing or not decides where fits end
-constexpr double kBeside[] = {0.7, 1.4};  // times the gap of a fit, from which others begin
-constexpr std::size_t kNearer = 3;        // guesses that are looked at with less noise
-constexpr std::size_t kGoneOn = 2;        // guesses that go on, the cheapest that differ
-constexpr double kFirstNoise = 0.05;      // of the width, of what is left at first
-constexpr double kOtherNoise = 0.1;       // by which the noise must differ for another fit
-constexpr double kAlike = 0.2;            // of the play, between fits that are the same
-constexpr double kUnsureFriction = 0.5;   // of the declared dry friction of the motor, as the fit has it
-constexpr double kUnsureTorque = 2;       // theory: 95 % of what nothing explains
+constexpr double kBeside[] = {0.7, 1.4};                 // times the gap of a fit, from which others begin
+constexpr std::size_t kNearer = 3;                       // guesses that are looked at with less noise
+constexpr std::size_t kGoneOn = 2;                       // guesses that go on, the cheapest that differ
+constexpr double kFirstNoise = 0.05;                     // of the width, of what is left at first
+constexpr double kOtherNoise = 0.1;                      // by which the noise must differ for another fit
+constexpr double kAlike = 0.2;                           // of the play, between fits that are the same
+constexpr double kUnsureFriction = 0.5;  // of the declared dry friction of the motor, as the fit has it
+constexpr double kUnsureTorque = 2;      // theory: 95 % of what nothing explains
 // The gates.
 constexpr double kFewOf = 0.35;    // of all crossings: simulation, see require_most()
 constexpr int kFewestPressed = 5;  // windows, for each flank
@@ -160,23 +158,16 @@ Fits run_some(Fits fits) {
   return kept;
 }
 
-std::vector<double> bounces(const TraverseData& data) {
-  if (data.load.empty()) return {0};
-  return {std::begin(kBounces), std::end(kBounces)};
-}
-
-/// Fits from these gaps [rad], each with these changes of the damping [spreads].
+/// Fits from these gaps [rad].
 Fits searched(const TraverseData& data, const GapTraverseSettings& settings,
               const std::vector<TraverseWindow>& windows, const Eigen::VectorXd& from,
-              const std::vector<double>& gaps, double noise, const std::vector<double>& dampings = {0}) {
+              const std::vector<double>& gaps, double noise) {
   Fits fits;
-  for (const double gap : gaps)
-    for (const double damping : dampings) {
-      fits.emplace_back(data, settings, windows, from, noise);
-      const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
-      fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
-      fits.back().fit.shared[kTraverseDamping] += damping;
-    }
+  for (const double gap : gaps) {
+    fits.emplace_back(data, settings, windows, from, noise);
+    const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
+    fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
+  }
   return run_some(std::move(fits));
 }
 
@@ -245,8 +236,7 @@ Fits solve(TraverseData& data, const GapTraverseSettings& settings,
   // A fit stops where it is cheapest nearby.
   std::vector<double> beside;
   for (const double factor : kBeside) beside.push_back(factor * fits[0].gap());
-  for (const TraverseFit& other :
-       searched(data, settings, few, fits[0].fit.shared, beside, noise, bounces(data)))
+  for (const TraverseFit& other : searched(data, settings, few, fits[0].fit.shared, beside, noise))
     if (!alike(other, fits[0])) fits.push_back(gone_on(data, settings, all, other, noise));
   for (std::size_t i = 1; i < guesses.size() && i < kGoneOn; ++i)
     fits.push_back(gone_on(data, settings, all, guesses[i], noise));
@@ -369,7 +359,7 @@ void by_load(Estimate& e, const record::Record& record, const GapTraverseSetting
   std::vector<double> starts;
   for (const double share : kShares) starts.push_back(share * data.width);
   const Fits guesses = nearer(searched(data, s, some(wide, kSearched), Eigen::VectorXd::Zero(kTraverseValues),
-                                       starts, kFirstNoise * data.width / data.load_noise, bounces(data)));
+                                       starts, kFirstNoise * data.width / data.load_noise));
   if (guesses.empty())
     throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
   fill(e, solve(data, s, chosen, guesses), data, s);

@@ -20,15 +20,6 @@ struct UnseenSize {
         deflection(p.deflection.empty()
                        ? 0
                        : p.deflection_error.error / std::max(kLeastFloor, p.deflection_error.floor)) {}
-  /// Without a channel that none of the effects is seen in.
-  void only_of(const std::vector<Effect>& effects) {
-    const auto seen = [&](bool in_deflection) {
-      return std::any_of(effects.begin(), effects.end(),
-                         [&](const Effect& e) { return e.gain.deflection == in_deflection; });
-    };
-    if (!seen(false)) torque = 0;
-    if (!seen(true)) deflection = 0;
-  }
   double square() const { return torque * torque + deflection * deflection; }
   double most() const { return std::max(torque, deflection); }
 
@@ -39,7 +30,7 @@ struct UnseenSize {
 /// it; empty: they are. The error of the signal counts, which a delay moves to where it may be smaller. Of
 /// two inertias as drop_stand_ins(): what is left far above the noise must be less than half, in squares.
 std::string together_not_borne_out(const Hypothesis& h, const Hypothesis& declared, const ServoData& unseen,
-                                   bool own_channels, const SearchContext& context) {
+                                   const SearchContext& context) {
   const ServoPrediction was = predicted(declared.base->fit.machine, unseen, context.settings.fit),
                         is = predicted(h.fitted->fit.machine, unseen, context.settings.fit);
   const bool better = std::any_of(h.effects.begin(), h.effects.end(), [&](const Effect& effect) {
@@ -48,9 +39,7 @@ std::string together_not_borne_out(const Hypothesis& h, const Hypothesis& declar
     return (is.*channel).error < (was.*channel).error;
   });
   if (!better) return "the unseen record is told no better than by the declared machine";
-  UnseenSize before(was), after(is);
-  if (own_channels)
-    for (UnseenSize* size : {&before, &after}) size->only_of(h.effects);
+  const UnseenSize before(was), after(is);
   const double half = context.settings.revision.half;
   if (simulation::load_moves_freely(h.declared->rig) &&
       after.most() > context.settings.acceptance.near_floor && after.square() > half * before.square())
@@ -64,9 +53,9 @@ std::string together_not_borne_out(const Hypothesis& h, const Hypothesis& declar
 }  // namespace
 
 Hypothesis believe_together(const Hypothesis& h, const Hypothesis& declared, const ServoData& unseen,
-                            bool own_channels, const SearchContext& context) {
+                            const SearchContext& context) {
   if (h.effects.empty()) return h;
-  const std::string why = together_not_borne_out(h, declared, unseen, own_channels, context);
+  const std::string why = together_not_borne_out(h, declared, unseen, context);
   if (why.empty()) return h;
   Hypothesis none = declared;
   none.rejected = h.rejected;

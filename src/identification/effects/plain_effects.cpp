@@ -42,13 +42,22 @@ std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& co
         found.better >= acceptance.most_blocks * acceptance.blocks)
       all.push_back({c, found});
   }
-  const auto tied = std::find_if(all.begin(), all.end(), [&](const Plain& p) {
-    return p.held_out.deflection != all.front().held_out.deflection ||
-           1 - p.held_out.gain > settings.revision.as_good * (1 - all.front().held_out.gain);
-  });
+  const auto nearly = [&](double factor) {
+    return [&, factor](const Plain& p) {
+      return p.held_out.deflection == all.front().held_out.deflection &&
+             1 - p.held_out.gain <= factor * (1 - all.front().held_out.gain);
+    };
+  };
+  const auto tied = std::find_if_not(all.begin(), all.end(), nearly(1 + settings.trials.tie));
   std::stable_sort(all.begin(), tied, [](const Plain& a, const Plain& b) {
     return unknowns(a.candidate) < unknowns(b.candidate);
   });
+  // What every machine has is no effect of another name.
+  const auto as_good = nearly(settings.revision.as_good);
+  const auto usual = std::find_if(all.begin(), all.end(), [&](const Plain& p) {
+    return is_usual(p.candidate, h.declared->rig) && as_good(p);
+  });
+  if (usual != all.end()) std::rotate(all.begin(), usual, usual + 1);
   return all;
 }
 

@@ -58,24 +58,26 @@ Hypothesis believe_physical(const Hypothesis& before, const ServoData& unseen, c
 
 /// Together, and with friction held at zero, they may tell less than each did.
 Hypothesis believe_all(const Hypothesis& before, const Hypothesis& declared, const ServoData& unseen,
-                       bool own_channels, const SearchContext& context) {
+                       const SearchContext& context) {
   const Hypothesis h = believe_physical(before, unseen, context),
-                   together = believe_together(h, declared, unseen, own_channels, context);
+                   together = believe_together(h, declared, unseen, context);
   return together.fitted == h.fitted ? h : believe_physical(together, unseen, context);
 }
 
-/// What two encoders show plainly, where the unseen record bears all of it out, or one that has a name.
+/// What two encoders show plainly, where the unseen record bears out one that has a name; or no more than
+/// every machine has.
 std::optional<Hypothesis> plain_effects(const Hypothesis& declared, const ServoData& unseen,
                                         const SearchContext& context) {
+  const auto named = [](const Hypothesis& h) {
+    return std::any_of(h.effects.begin(), h.effects.end(),
+                       [&](const Effect& effect) { return !is_usual(effect.candidate, h.declared->rig); });
+  };
   Hypothesis h = add_plain_effects(declared, context);
-  const std::size_t count = h.effects.size();
-  if (count == 0) return std::nullopt;
-  h = believe_all(add_shape_of_friction(h, context), declared, unseen, true, context);
-  const bool named = std::any_of(h.effects.begin(), h.effects.end(), [&](const Effect& effect) {
-    return !is_usual(effect.candidate, h.declared->rig);
-  });
-  if (named || h.effects.size() >= count) return h;
-  return std::nullopt;
+  if (h.effects.empty()) return std::nullopt;
+  h = add_shape_of_friction(h, context);
+  if (!named(h)) return h;
+  h = believe_all(h, declared, unseen, context);
+  return named(h) ? std::optional(h) : std::nullopt;
 }
 
 }  // namespace
@@ -103,7 +105,7 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
   h = try_equivalents(h, context);
   h = add_learned(h, context);
   h = drop_stand_ins(h, context);
-  result.found = believe_all(h, result.declared, unseen, false, context);
+  result.found = believe_all(h, result.declared, unseen, context);
   return result;
 }
 

@@ -65,9 +65,9 @@ Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
 Hypothesis believe(const Hypothesis& h, const ServoData& unseen, const SearchContext& context);
 
 /// The declared machine without effects where those that are believed one by one do not tell more of the
-/// unseen record together: of the channels that they are seen in (own_channels), or of both.
+/// unseen record together.
 Hypothesis believe_together(const Hypothesis& h, const Hypothesis& declared, const ServoData& unseen,
-                            bool own_channels, const SearchContext& context);
+                            const SearchContext& context);
 
 /// Of a machine that is coupled to other axes: with stiff teeth, unless the unseen record bears their
 /// compliance out.

@@ -371,8 +371,8 @@ TEST(BelieveTogether, DropsAllWhereTheyTellNoMoreThanTheDeclaredMachine) {
   const auto unseen = [](const OneInertiaMachine& machine) {
     return servo_data(record_of(machine, 5), test::one_inertia_rig());
   };
-  EXPECT_EQ(believe_together(h, declared, unseen(with_cogging()), false, bench.context).fitted, h.fitted);
-  const Hypothesis none = believe_together(h, declared, unseen(OneInertiaMachine()), false, bench.context);
+  EXPECT_EQ(believe_together(h, declared, unseen(with_cogging()), bench.context).fitted, h.fitted);
+  const Hypothesis none = believe_together(h, declared, unseen(OneInertiaMachine()), bench.context);
   EXPECT_TRUE(none.effects.empty());
   EXPECT_EQ(none.fitted, declared.base);
   EXPECT_NE(reason(none, "cogging").find("no better than by the declared machine"), std::string::npos);
