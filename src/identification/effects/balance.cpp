@@ -243,35 +243,65 @@ Eigen::VectorXd Balance::column(const model::Term& term, double telling) const {
   return own;
 }
 
-Balance::HeldOut Balance::held_out(const Eigen::MatrixXd& columns, int blocks) const {
+struct Balance::Squares {
+  std::array<double, 2> before = {0, 0}, after = {0, 0}, count = {0, 0};
+
+  double decrease(std::size_t channel) const { return before[channel] - after[channel]; }
+  double gain(std::size_t channel) const {
+    return before[channel] > 0 ? 1 - std::sqrt(after[channel] / before[channel]) : 0;
+  }
+  void add(const Squares& other) {
+    for (const std::size_t c : {0, 1})
+      before[c] += other.before[c], after[c] += other.after[c], count[c] += other.count[c];
+  }
+};
+
+Balance::Squares Balance::squares_of(const std::vector<Eigen::Index>& rows, const Eigen::MatrixXd& columns,
+                                     const Eigen::VectorXd& factors) const {
+  Squares s;
+  for (const Eigen::Index i : rows) {
+    const auto channel = std::size_t(deflection_[std::size_t(i)]);
+    s.before[channel] += std::pow(left_[i], 2), ++s.count[channel];
+    s.after[channel] += std::pow(left_[i] - columns.row(i).dot(factors), 2);
+  }
+  return s;
+}
+
+Balance::Explained Balance::explained(const Eigen::MatrixXd& columns, int blocks, double earlier) const {
   const Eigen::MatrixXd normal = signal::gram(columns);
   const Eigen::VectorXd gradient = columns.transpose() * left_;
-  double before[2] = {0, 0}, after[2] = {0, 0};
-  std::vector<std::array<double, 2>> decrease(std::size_t(blocks), {0, 0});
-  double count[2] = {0, 0};
-  for (int b = 0; b < blocks; ++b) {
-    std::vector<Eigen::Index> own;
+  const auto rows_where = [&](const auto& wanted) {
+    std::vector<Eigen::Index> rows;
     for (Eigen::Index i = 0; i < left_.size(); ++i)
-      if (std::min(blocks - 1, int(blocks * time_[std::size_t(i)])) == b) own.push_back(i);
-    const Eigen::MatrixXd part = columns(own, Eigen::all);
-    const Eigen::VectorXd of_left = left_(own);
-    const Eigen::VectorXd factors =
-        signal::solve_symmetric(normal - signal::gram(part), gradient - part.transpose() * of_left);
-    const Eigen::VectorXd rest = of_left - part * factors;
-    for (std::size_t i = 0; i < own.size(); ++i) {
-      const auto channel = std::size_t(deflection_[std::size_t(own[i])]);
-      const double was = std::pow(of_left[Eigen::Index(i)], 2), is = std::pow(rest[Eigen::Index(i)], 2);
-      before[channel] += was, after[channel] += is, ++count[channel];
-      decrease[std::size_t(b)][channel] += was - is;
-    }
+      if (wanted(time_[std::size_t(i)])) rows.push_back(i);
+    return rows;
+  };
+  /// Of rows, with the factors that all others want.
+  const auto without = [&](const std::vector<Eigen::Index>& rows) {
+    const Eigen::MatrixXd own = columns(rows, Eigen::all);
+    const Eigen::VectorXd of_left = left_(rows);
+    return squares_of(
+        rows, columns,
+        signal::solve_symmetric(normal - signal::gram(own), gradient - own.transpose() * of_left));
+  };
+  Squares held_out;
+  std::vector<Squares> of_blocks;
+  for (int b = 0; b < blocks; ++b) {
+    of_blocks.push_back(
+        without(rows_where([&](double t) { return std::min(blocks - 1, int(blocks * t)) == b; })));
+    held_out.add(of_blocks.back());
   }
-  HeldOut out;
-  out.deflection = before[1] - after[1] > before[0] - after[0];
+  Explained out;
+  out.deflection = held_out.decrease(1) > held_out.decrease(0);
   const auto channel = std::size_t(out.deflection);
-  out.gain = 1 - std::sqrt(after[channel] / before[channel]);
-  for (const auto& d : decrease) out.better += d[channel] > 0;
+  out.gain =
+      squares_of(rows_where([](double) { return true; }), columns, signal::solve_symmetric(normal, gradient))
+          .gain(channel);
+  out.gain_held_out = held_out.gain(channel);
+  out.gain_forward = without(rows_where([&](double t) { return t > earlier; })).gain(channel);
+  for (const Squares& block : of_blocks) out.better += block.decrease(channel) > 0;
   out.of_signal =
-      std::sqrt(std::max(0.0, before[channel] - after[channel]) / count[channel]) / signal_[channel];
+      std::sqrt(std::max(0.0, held_out.decrease(channel)) / held_out.count[channel]) / signal_[channel];
   return out;
 }
 

@@ -30,15 +30,18 @@ class Balance {
   /// that is less than `telling` of it.
   Eigen::VectorXd column(const model::Term& term, double telling) const;
 
-  /// What columns explain of the channel of which they explain more, with the factors that the other blocks
-  /// of the records want, each block in turn.
-  struct HeldOut {
+  /// What columns explain of the channel of which they explain more: relative decreases of the norm of
+  /// left().
+  struct Explained {
     bool deflection = false;
-    double gain = 0;       // relative decrease of the norm of left()
-    int better = 0;        // blocks
-    double of_signal = 0;  // what is taken away, over the standard deviation of the channel
+    double gain = 0;           // with the factors that all of the records want
+    double gain_held_out = 0;  // of blocks, each with the factors that the others want
+    double gain_forward = 0;   // of the later part, with the factors that the earlier wants
+    int better = 0;            // blocks
+    double of_signal = 0;      // held out, what is taken away over the standard deviation of the channel
   };
-  HeldOut held_out(const Eigen::MatrixXd& columns, int blocks) const;
+  /// Each record in so many `blocks`, the later part from the share `earlier` of it on.
+  Explained explained(const Eigen::MatrixXd& columns, int blocks, double earlier) const;
 
  private:
   struct Sample {
@@ -62,6 +65,9 @@ class Balance {
   std::vector<Eigen::VectorXd> base(const std::vector<ServoData>& data) const;
   Eigen::VectorXd measured(const Machine& machine, const std::vector<ServoData>& data) const;
   void scale(const Eigen::VectorXd& signal);
+  struct Squares;  // of both channels, before and after
+  Squares squares_of(const std::vector<Eigen::Index>& rows, const Eigen::MatrixXd& columns,
+                     const Eigen::VectorXd& factors) const;
 
   const model::Rig rig_;
   const double cutoff_;

@@ -212,15 +212,14 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
     if (left.norm() < settings.telling * change.norm() || change.norm() == 0) left.setZero();
     return left;
   };
-  return screen(fit, records, range, settings, orthogonal.residuals(), column);
+  return screen(fit.machine.rig, ResidualOrders(fit, records, orthogonal), range, settings,
+                orthogonal.residuals(), column);
 }
 
-std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
+std::vector<Candidate> screen(const model::Rig& rig, const ResidualOrders& orders,
                               const model::MotionRange& range, const ScreenSettings& settings,
                               const Eigen::VectorXd& left, const ColumnOf& column) {
-  const OrthogonalPart orthogonal(fit, Eigen::Index(records.layout().size()));
-  std::vector<Probed> all =
-      all_probes(fit.machine.rig, range, ResidualOrders(fit, records, orthogonal), settings);
+  std::vector<Probed> all = all_probes(rig, range, orders, settings);
   for_each_in_parallel(int(all.size()), [&](int i) {
     Probed& p = all[std::size_t(i)];
     try {

@@ -13,6 +13,8 @@
 
 namespace backlash::identification {
 
+class ResidualOrders;
+
 /// One or two terms of the same kind, with a start for what is fitted.
 struct Candidate {
   std::string id;
@@ -34,8 +36,8 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
 
 /// What a term changes of residuals, less what the fitted parameters explain as well.
 using ColumnOf = std::function<Eigen::VectorXd(const model::Term&)>;
-/// The same of other residuals, `left`, with their own sensitivities. `fit` and `records` show the orders.
-std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
+/// The same of other residuals, `left`, with their own sensitivities.
+std::vector<Candidate> screen(const model::Rig& rig, const ResidualOrders& orders,
                               const model::MotionRange& range, const ScreenSettings& settings,
                               const Eigen::VectorXd& left, const ColumnOf& column);
 /// All terms of a candidate, one that has a phase as sine and cosine.

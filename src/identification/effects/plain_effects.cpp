@@ -7,7 +7,8 @@
 
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "balance.h"
-#include "effect_roles.h"
+#include "orthogonal_part.h"
+#include "residual_orders.h"
 #include "steps.h"
 
 namespace backlash::identification {
@@ -15,7 +16,7 @@ namespace {
 
 struct Plain {
   Candidate candidate;
-  Balance::HeldOut held_out;
+  Balance::Explained explained;
 };
 
 /// Numbers that a fit of it has to find.
@@ -31,21 +32,24 @@ std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& co
   const Balance balance(h.fitted->fit.machine, context.data, settings.fit.rough_cutoff);
   const auto column = [&](const model::Term& term) { return balance.column(term, settings.screen.telling); };
   std::vector<Plain> all;
+  const MachineFit& fit = h.fitted->fit;
+  const OrthogonalPart left(fit, Eigen::Index(h.fitted->records.layout().size()));
+  const ResidualOrders orders(fit, h.fitted->records, left);
   for (const Candidate& c :
-       screen(h.fitted->fit, h.fitted->records, context.range, settings.screen, balance.left(), column)) {
+       screen(fit.machine.rig, orders, context.range, settings.screen, balance.left(), column)) {
     if (all.size() >= settings.trials.most) break;
     const auto terms = probed_terms(c);
     Eigen::MatrixXd columns(balance.left().size(), Eigen::Index(terms.size()));
     for (std::size_t i = 0; i < terms.size(); ++i) columns.col(Eigen::Index(i)) = column(*terms[i]);
-    const Balance::HeldOut found = balance.held_out(columns, acceptance.blocks);
-    if (found.gain >= settings.asked.least_gain_unclear && found.of_signal >= acceptance.noise &&
+    const Balance::Explained found = balance.explained(columns, acceptance.blocks, acceptance.earlier_part);
+    if (found.gain_held_out >= settings.asked.least_gain_unclear && found.of_signal >= acceptance.noise &&
         found.better >= acceptance.most_blocks * acceptance.blocks)
       all.push_back({c, found});
   }
   const auto nearly = [&](double factor) {
     return [&, factor](const Plain& p) {
-      return p.held_out.deflection == all.front().held_out.deflection &&
-             1 - p.held_out.gain <= factor * (1 - all.front().held_out.gain);
+      return p.explained.deflection == all.front().explained.deflection &&
+             1 - p.explained.gain_held_out <= factor * (1 - all.front().explained.gain_held_out);
     };
   };
   const auto tied = std::find_if_not(all.begin(), all.end(), nearly(1 + settings.trials.tie));
@@ -64,12 +68,12 @@ std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& co
 /// One of them, with the others that explain nearly as much of the same channel.
 Effect effect_of(const Plain& best, const std::vector<Plain>& plain, const SearchSettings& settings) {
   Effect effect{best.candidate, {}, {}, {}, {}};
-  effect.gain.deflection = best.held_out.deflection;
-  effect.gain.evidence = {best.held_out.gain, best.held_out.gain, best.held_out.gain, best.held_out.better,
-                          settings.acceptance.blocks};
+  effect.gain.deflection = best.explained.deflection;
+  const Balance::Explained& e = best.explained;
+  effect.gain.evidence = {e.gain, e.gain_held_out, e.gain_forward, e.better, settings.acceptance.blocks};
   for (const Plain& other : plain)
-    if (other.candidate.id != best.candidate.id && other.held_out.deflection == best.held_out.deflection &&
-        other.held_out.gain >= settings.revision.alike * best.held_out.gain)
+    if (other.candidate.id != best.candidate.id && other.explained.deflection == best.explained.deflection &&
+        other.explained.gain_held_out >= settings.revision.alike * best.explained.gain_held_out)
       effect.alternatives.push_back(other.candidate);
   return effect;
 }

@@ -94,6 +94,27 @@ TEST(EffectSearch, PreslidingIsTheShapeOfFrictionOrAnEffect) {
   expect_at_floor(effect);
 }
 
+// An offset of the torque, a twelfth of the declared dry friction, is what the zero of a current sensor
+// leaves; and the load's encoder of the test record counts from another zero, as after the robot was switched
+// on again.
+TEST(EffectSearch, WhatEveryMachineHasIsNotedAndNotCalledMissing) {
+  model::Rig machine = test::other_servo();
+  ParameterValues offset{{"torque", 5}};
+  offset.set_choice("body", "motor");
+  machine.terms = {model::make_term("cogging", {{"amplitude", 15}, {"order", 36}, {"phase", 0.7}}),
+                   model::make_term("asymmetric_coulomb", offset)};
+  Records records = records_of(machine);
+  for (double& q : records.test.column(record::Channel::load_position)) q += 0.3;
+  const Trace trace = traced(records);
+  EXPECT_EQ(found(trace), std::set<std::string>{"cogging"});
+  EXPECT_NEAR(parameter(trace, "cogging", "amplitude").value, 15, 0.05 * 15);
+  ASSERT_EQ(trace.notes.size(), 1u);
+  EXPECT_NE(trace.notes[0].find("asymmetric_coulomb (torque"), std::string::npos) << trace.notes[0];
+  EXPECT_NEAR(trace.augmented.terms.back()->values.at("torque"), 5, 0.1 * 5);
+  EXPECT_FALSE(trace.unexplained);
+  expect_at_floor(trace);
+}
+
 /// Hertzian teeth, about as stiff as those of other_servo() under 300 N m.
 model::Rig hertzian_servo() {
   model::Rig machine = test::other_servo();
