@@ -31,14 +31,16 @@ constexpr int kSearched = 16;    // windows of a first guess
 constexpr int kSearch = 20;      // steps of one
 constexpr double kGuesses[] = {0.3, 0.55, 1, 1.8, 3.3};  // times the declared gap
 constexpr double kShares[] = {0.3, 0.5, 0.7, 0.85, 1};   // of the range of motor minus load position
-constexpr double kBeside[] = {0.7, 1.4};                 // times the gap of a fit, from which others begin
-constexpr std::size_t kNearer = 3;                       // guesses that are looked at with less noise
-constexpr std::size_t kGoneOn = 2;                       // guesses that go on, the cheapest that differ
-constexpr double kFirstNoise = 0.05;                     // of the width, of what is left at first
-constexpr double kOtherNoise = 0.1;                      // by which the noise must differ for another fit
-constexpr double kAlike = 0.2;                           // of the play, between fits that are the same
-constexpr double kUnsureFriction = 0.5;  // of the declared dry friction of the motor, as the fit has it
-constexpr double kUnsureTorque = 2;      // theory: 95 % of what nothing explains
+constexpr double kBounces[] = {-1.5, 0,
+                               1.5};      // spreads of the damping: bouncing or not decides where fits end
+constexpr double kBeside[] = {0.7, 1.4};  // times the gap of a fit, from which others begin
+constexpr std::size_t kNearer = 3;        // guesses that are looked at with less noise
+constexpr std::size_t kGoneOn = 2;        // guesses that go on, the cheapest that differ
+constexpr double kFirstNoise = 0.05;      // of the width, of what is left at first
+constexpr double kOtherNoise = 0.1;       // by which the noise must differ for another fit
+constexpr double kAlike = 0.2;            // of the play, between fits that are the same
+constexpr double kUnsureFriction = 0.5;   // of the declared dry friction of the motor, as the fit has it
+constexpr double kUnsureTorque = 2;       // theory: 95 % of what nothing explains
 // The gates.
 constexpr double kFewOf = 0.35;    // of all crossings: simulation, see require_most()
 constexpr int kFewestPressed = 5;  // windows, for each flank
@@ -158,16 +160,23 @@ Fits run_some(Fits fits) {
   return kept;
 }
 
-/// Fits from these gaps [rad].
+std::vector<double> bounces(const TraverseData& data) {
+  if (data.load.empty()) return {0};
+  return {std::begin(kBounces), std::end(kBounces)};
+}
+
+/// Fits from these gaps [rad], each with these changes of the damping [spreads].
 Fits searched(const TraverseData& data, const GapTraverseSettings& settings,
               const std::vector<TraverseWindow>& windows, const Eigen::VectorXd& from,
-              const std::vector<double>& gaps, double noise) {
+              const std::vector<double>& gaps, double noise, const std::vector<double>& dampings = {0}) {
   Fits fits;
-  for (const double gap : gaps) {
-    fits.emplace_back(data, settings, windows, from, noise);
-    const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
-    fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
-  }
+  for (const double gap : gaps)
+    for (const double damping : dampings) {
+      fits.emplace_back(data, settings, windows, from, noise);
+      const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
+      fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
+      fits.back().fit.shared[kTraverseDamping] += damping;
+    }
   return run_some(std::move(fits));
 }
 
@@ -203,6 +212,21 @@ struct Errors {
   double scale() const { return std::pow(std::max(1.0, clustered / of_fit), 2); }
 };
 
+bool sure(const TraverseFit& fit) {
+  return 2 * Errors(fit).larger() < kAlike;
+}
+
+/// Of half a record, on from the fit of the whole; where that leads nowhere, from other gaps.
+TraverseFit half_of(const TraverseData& data, const GapTraverseSettings& settings,
+                    const std::vector<TraverseWindow>& half, const TraverseFit& whole) {
+  TraverseFit fit = gone_on(data, settings, half, whole, whole.noise());
+  if (sure(fit)) return fit;
+  std::vector<double> gaps;
+  for (const double factor : kGuesses) gaps.push_back(factor * whole.gap());
+  const Fits others = searched(data, settings, some(half, kSearched), whole.fit.shared, gaps, whole.noise());
+  return others.empty() ? std::move(fit) : gone_on(data, settings, half, others[0], whole.noise());
+}
+
 /// Adds those of either half of the record, where they are sure of another play: one that steps or grows.
 void add_halves(Fits& fits, const TraverseData& data, const GapTraverseSettings& settings,
                 std::vector<TraverseWindow> windows) {
@@ -210,9 +234,8 @@ void add_halves(Fits& fits, const TraverseData& data, const GapTraverseSettings&
   const auto middle = windows.begin() + std::ptrdiff_t(windows.size() / 2);
   for (const std::vector<TraverseWindow>& half : {std::vector<TraverseWindow>(windows.begin(), middle),
                                                   std::vector<TraverseWindow>(middle, windows.end())}) {
-    TraverseFit fit = gone_on(data, settings, half, fits[0], fits[0].noise());
-    const double error = Errors(fit).larger();
-    if (std::fabs(std::log(fit.gap() / fits[0].gap())) > kAlike + 3 * error && 2 * error < kAlike)
+    TraverseFit fit = half_of(data, settings, half, fits[0]);
+    if (std::fabs(std::log(fit.gap() / fits[0].gap())) > kAlike + 3 * Errors(fit).larger() && sure(fit))
       fits.push_back(std::move(fit));
   }
 }
@@ -236,7 +259,8 @@ Fits solve(TraverseData& data, const GapTraverseSettings& settings,
   // A fit stops where it is cheapest nearby.
   std::vector<double> beside;
   for (const double factor : kBeside) beside.push_back(factor * fits[0].gap());
-  for (const TraverseFit& other : searched(data, settings, few, fits[0].fit.shared, beside, noise))
+  for (const TraverseFit& other :
+       searched(data, settings, few, fits[0].fit.shared, beside, noise, bounces(data)))
     if (!alike(other, fits[0])) fits.push_back(gone_on(data, settings, all, other, noise));
   for (std::size_t i = 1; i < guesses.size() && i < kGoneOn; ++i)
     fits.push_back(gone_on(data, settings, all, guesses[i], noise));
@@ -359,7 +383,7 @@ void by_load(Estimate& e, const record::Record& record, const GapTraverseSetting
   std::vector<double> starts;
   for (const double share : kShares) starts.push_back(share * data.width);
   const Fits guesses = nearer(searched(data, s, some(wide, kSearched), Eigen::VectorXd::Zero(kTraverseValues),
-                                       starts, kFirstNoise * data.width / data.load_noise));
+                                       starts, kFirstNoise * data.width / data.load_noise, bounces(data)));
   if (guesses.empty())
     throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
   fill(e, solve(data, s, chosen, guesses), data, s);
