@@ -5,18 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <memory>
 #include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
+#include "traverse_search.h"
 #include "traverse_waves.h"
-#include "traverse_windows.h"
 
 namespace backlash::diagnosis {
 namespace {
@@ -24,23 +21,12 @@ namespace {
 // Choices, tried on joints of test/campaigns/robot_joints and tests, but where another origin is given.
 constexpr int kFewest = 20,
               kFewestFirst = 8;  // crossings by the motor alone, for the answer and to know the motor
-constexpr int kMost = 60;        // windows, beyond which the errors do not shrink
 constexpr int kMostWide = 45;    // of them, in which both flanks are seen
 constexpr double kWide = 0.5;    // of the range in most windows: both flanks are seen
-constexpr int kSearched = 16;    // windows of a first guess
-constexpr int kSearch = 20;      // steps of one
-constexpr double kGuesses[] = {0.3, 0.55, 1, 1.8, 3.3};  // times the declared gap
-constexpr double kShares[] = {0.3, 0.5, 0.7, 0.85, 1};   // of the range of motor minus load position
-constexpr double kBounces[] = {-1.5, 0,
-                               1.5};      // spreads of the damping: bouncing or not decides where fits end
-constexpr double kBeside[] = {0.7, 1.4};  // times the gap of a fit, from which others begin
-constexpr std::size_t kNearer = 3;        // guesses that are looked at with less noise
-constexpr std::size_t kGoneOn = 2;        // guesses that go on, the cheapest that differ
-constexpr double kFirstNoise = 0.05;      // of the width, of what is left at first
-constexpr double kOtherNoise = 0.1;       // by which the noise must differ for another fit
-constexpr double kAlike = 0.2;            // of the play, between fits that are the same
-constexpr double kUnsureFriction = 0.5;   // of the declared dry friction of the motor, as the fit has it
-constexpr double kUnsureTorque = 2;       // theory: 95 % of what nothing explains
+constexpr double kShares[] = {0.3, 0.5, 0.7, 0.85, 1};  // of the range of motor minus load position
+constexpr double kFirstNoise = 0.05;                    // of the width, of what is left at first
+constexpr double kUnsureFriction = 0.5;  // of the declared dry friction of the motor, as the fit has it
+constexpr double kUnsureTorque = 2;      // theory: 95 % of what nothing explains
 // The gates.
 constexpr double kFewOf = 0.35;    // of all crossings: simulation, see require_most()
 constexpr int kFewestPressed = 5;  // windows, for each flank
@@ -52,8 +38,7 @@ constexpr double kFar = 4;  // spreads of a declared value
 constexpr double kLeft = 0.35;  // of the deflection or the torque, that is not explained
 constexpr double kVague = 4;    // upper over lower end of an interval, by which it says too little
 // The interval.
-constexpr double kRivalCost = 9;  // theory: three standard errors
-constexpr double kLaw = 0.2;      // of a flank's deflection, 95 %: laws of teeth in no prior: simulation
+constexpr double kLaw = 0.2;  // of a flank's deflection, 95 %: laws of teeth in no prior: simulation
 // Theory: Hertz's flanks fitted by lines move the gap by 0.30 of the deflection, and leave 0.0327 rms.
 constexpr double kLawOfLeft = 0.30 / 0.0327;
 // Of the play: what moves it beside the declared, by the motor alone and with the load's encoder, whose error
@@ -86,192 +71,6 @@ void check_channels(const record::Record& record, bool load) {
       if (!std::isfinite(value))
         throw Refusal{Status::insufficient_data, record::channel_name(channel) + " has gaps"};
   }
-}
-
-/// Spread evenly over the record.
-std::vector<TraverseWindow> some(const std::vector<TraverseWindow>& all, int most) {
-  if (int(all.size()) <= most) return all;
-  std::vector<TraverseWindow> chosen;
-  for (int i = 0; i < most; ++i)
-    chosen.push_back(all[static_cast<std::size_t>(i) * all.size() / static_cast<std::size_t>(most)]);
-  return chosen;
-}
-
-/// A machine fitted to some windows of a record.
-struct TraverseFit {
-  std::unique_ptr<TraverseWindows> windows;
-  fit::WindowedFit fit;
-
-  TraverseFit(const TraverseData& data, const GapTraverseSettings& settings, std::vector<TraverseWindow> some,
-              const Eigen::VectorXd& shared, double of_noise)
-      : windows(std::make_unique<TraverseWindows>(data, settings, std::move(some))), fit(*windows) {
-    windows->noise = of_noise;
-    fit.shared = shared;
-  }
-
-  /// Of another fit of the same windows.
-  void begin_with_own_of(const TraverseFit& other) {
-    for (std::size_t w = 0; w < fit.own.size(); ++w)
-      for (int k = 0; k < kTraverseOwn; ++k)
-        if (const double spread = windows->own()[std::size_t(k)].spread; spread > 0)
-          fit.own[w][k] = other.fit.own[w][k] * other.windows->own()[std::size_t(k)].spread / spread;
-  }
-
-  double noise() const { return windows->noise; }
-  /// Times a sample's, as which what is left would count for what it is.
-  double noise_left() const { return noise() * std::sqrt(fit.mean_square()); }
-  double gap() const { return fit.value(kTraverseGap); }
-  /// Root mean square over the windows of what is left, in noises.
-  double misfit() const {
-    double squares = 0, expected = 0;
-    for (int w = 0; w < windows->count(); ++w) {
-      squares += fit.weight(w) * fit.residual(w).squaredNorm();
-      expected += fit.weight(w) * windows->squares_of_noise(w);
-    }
-    return std::sqrt(squares / expected);
-  }
-  /// Root mean square over the windows of a value of their own.
-  double rms_of_own(int which) const {
-    double squares = 0;
-    for (int w = 0; w < windows->count(); ++w)
-      squares += std::pow(windows->own()[std::size_t(which)].value(fit.own[std::size_t(w)][which]), 2);
-    return std::sqrt(squares / windows->count());
-  }
-};
-
-bool alike(const TraverseFit& a, const TraverseFit& b) {
-  return std::fabs(std::log(a.gap() / b.gap())) < kAlike;
-}
-
-using Fits = std::vector<TraverseFit>;
-
-/// Some steps of each, side by side. Returns them cheapest first, without those that came to the same.
-Fits run_some(Fits fits) {
-  fit::FitOptions options;
-  options.iterations = kSearch;
-  for_each_in_parallel(int(fits.size()), [&](int i) { fits[std::size_t(i)].fit.run(options); });
-  std::stable_sort(fits.begin(), fits.end(),
-                   [](const auto& a, const auto& b) { return a.fit.cost() < b.fit.cost(); });
-  Fits kept;
-  for (TraverseFit& fit : fits)
-    if (std::isfinite(fit.fit.cost()) &&
-        std::none_of(kept.begin(), kept.end(), [&](const auto& other) { return alike(fit, other); }))
-      kept.push_back(std::move(fit));
-  return kept;
-}
-
-std::vector<double> bounces(const TraverseData& data) {
-  if (data.load.empty()) return {0};
-  return {std::begin(kBounces), std::end(kBounces)};
-}
-
-/// Fits from these gaps [rad], each with these changes of the damping [spreads].
-Fits searched(const TraverseData& data, const GapTraverseSettings& settings,
-              const std::vector<TraverseWindow>& windows, const Eigen::VectorXd& from,
-              const std::vector<double>& gaps, double noise, const std::vector<double>& dampings = {0}) {
-  Fits fits;
-  for (const double gap : gaps)
-    for (const double damping : dampings) {
-      fits.emplace_back(data, settings, windows, from, noise);
-      const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
-      fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
-      fits.back().fit.shared[kTraverseDamping] += damping;
-    }
-  return run_some(std::move(fits));
-}
-
-/// The cheapest of those that have begun from afar, with a noise in which all of them saw where to go: on
-/// with what the best leaves.
-Fits nearer(Fits fits) {
-  while (fits.size() > kNearer) fits.pop_back();
-  double noise = std::numeric_limits<double>::infinity();
-  for (const TraverseFit& fit : fits) noise = std::min(noise, fit.noise_left());
-  for (TraverseFit& fit : fits) fit.windows->noise = std::max(1.0, noise);
-  return run_some(std::move(fits));
-}
-
-/// Another fit's machine on these windows.
-TraverseFit gone_on(const TraverseData& data, const GapTraverseSettings& settings,
-                    const std::vector<TraverseWindow>& windows, const TraverseFit& from, double noise) {
-  TraverseFit fit(data, settings, windows, from.fit.shared, noise);
-  if (from.fit.own.size() == windows.size()) fit.begin_with_own_of(from);
-  fit.fit.run({});
-  return fit;
-}
-
-/// Standard error of the logarithm of the gap: of the fit, and by windows as clusters.
-struct Errors {
-  double of_fit, clustered;
-  explicit Errors(const TraverseFit& f) {
-    const double spread = f.windows->shared()[kTraverseGap].spread;
-    of_fit = spread * std::sqrt(f.fit.covariance()(kTraverseGap, kTraverseGap));
-    clustered = spread * std::sqrt(f.fit.clustered_covariance()(kTraverseGap, kTraverseGap));
-  }
-  double larger() const { return std::max(of_fit, clustered); }
-  /// Of a difference of the cost, as many times as the windows scatter more than the noise has it.
-  double scale() const { return std::pow(std::max(1.0, clustered / of_fit), 2); }
-};
-
-bool sure(const TraverseFit& fit) {
-  return 2 * Errors(fit).larger() < kAlike;
-}
-
-/// Of half a record, on from the fit of the whole; where that leads nowhere, from other gaps.
-TraverseFit half_of(const TraverseData& data, const GapTraverseSettings& settings,
-                    const std::vector<TraverseWindow>& half, const TraverseFit& whole) {
-  TraverseFit fit = gone_on(data, settings, half, whole, whole.noise());
-  if (sure(fit)) return fit;
-  std::vector<double> gaps;
-  for (const double factor : kGuesses) gaps.push_back(factor * whole.gap());
-  const Fits others = searched(data, settings, some(half, kSearched), whole.fit.shared, gaps, whole.noise());
-  return others.empty() ? std::move(fit) : gone_on(data, settings, half, others[0], whole.noise());
-}
-
-/// Adds those of either half of the record, where they are sure of another play: one that steps or grows.
-void add_halves(Fits& fits, const TraverseData& data, const GapTraverseSettings& settings,
-                std::vector<TraverseWindow> windows) {
-  std::sort(windows.begin(), windows.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  const auto middle = windows.begin() + std::ptrdiff_t(windows.size() / 2);
-  for (const std::vector<TraverseWindow>& half : {std::vector<TraverseWindow>(windows.begin(), middle),
-                                                  std::vector<TraverseWindow>(middle, windows.end())}) {
-    TraverseFit fit = half_of(data, settings, half, fits[0]);
-    if (std::fabs(std::log(fit.gap() / fits[0].gap())) > kAlike + 3 * Errors(fit).larger() && sure(fit))
-      fits.push_back(std::move(fit));
-  }
-}
-
-/// The cheapest first, then those that the record hardly tells from it.
-Fits solve(TraverseData& data, const GapTraverseSettings& settings,
-           const std::vector<TraverseWindow>& windows, const Fits& guesses) {
-  const std::vector<TraverseWindow> all = some(windows, kMost), few = some(windows, kSearched);
-  Fits fits;
-  fits.push_back(gone_on(data, settings, all, guesses[0], guesses[0].noise()));
-  double noise = fits[0].noise_left();
-  if (data.load.empty()) noise = std::max(1.0, noise);
-  if (std::fabs(noise / fits[0].noise() - 1) > kOtherNoise) {  // once more, with what it has shown of itself
-    if (!data.load.empty()) {
-      data.shown_spread = std::max(2 * data.load_noise, fits[0].rms_of_own(kOwnShown));
-      data.load_torque_spread = std::max(data.load_torque_spread, fits[0].rms_of_own(kOwnLoadTorque));
-    }
-    fits[0] = gone_on(data, settings, all, fits[0], noise);
-  }
-  noise = fits[0].noise();
-  // A fit stops where it is cheapest nearby.
-  std::vector<double> beside;
-  for (const double factor : kBeside) beside.push_back(factor * fits[0].gap());
-  for (const TraverseFit& other :
-       searched(data, settings, few, fits[0].fit.shared, beside, noise, bounces(data)))
-    if (!alike(other, fits[0])) fits.push_back(gone_on(data, settings, all, other, noise));
-  for (std::size_t i = 1; i < guesses.size() && i < kGoneOn; ++i)
-    fits.push_back(gone_on(data, settings, all, guesses[i], noise));
-  std::stable_sort(fits.begin(), fits.end(),
-                   [](const auto& a, const auto& b) { return a.fit.cost() < b.fit.cost(); });
-  const double most = fits[0].fit.cost() + kRivalCost * Errors(fits[0]).scale();
-  if (!std::isfinite(most))
-    throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
-  while (!(fits.back().fit.cost() <= most)) fits.pop_back();
-  add_halves(fits, data, settings, all);
-  return fits;
 }
 
 /// [rad] Of a flank under the usual torque.
@@ -342,8 +141,8 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
   const double model = data.load.empty() ? kModel : std::min(kModelByLoad, tried / gap);
   double lower = gap, upper = gap;
   for (const TraverseFit& fit : fits) {
-    const double half =
-        std::hypot(signal::student_t_quantile(0.975, windows - 1) * Errors(fit).larger(), model, left);
+    const double half = std::hypot(
+        signal::student_t_quantile(0.975, windows - 1) * TraverseErrors(fit).larger(), model, left);
     if (!(std::exp(2 * half) < kVague))
       throw Refusal{
           Status::insufficient_data,
@@ -378,15 +177,16 @@ void by_load(Estimate& e, const record::Record& record, const GapTraverseSetting
       narrow;  // where both flanks are seen, and others, which show what the encoders err
   for (const TraverseWindow& window : data.windows)
     (window.width > kWide * data.window_width ? wide : narrow).push_back(window);
-  std::vector<TraverseWindow> chosen = some(wide, kMostWide);
-  for (const TraverseWindow& window : some(narrow, kMost - int(chosen.size()))) chosen.push_back(window);
+  std::vector<TraverseWindow> chosen = spread_evenly(wide, kMostWide);
+  for (const TraverseWindow& window : spread_evenly(narrow, kTraverseWindows - int(chosen.size())))
+    chosen.push_back(window);
   std::vector<double> starts;
   for (const double share : kShares) starts.push_back(share * data.width);
-  const Fits guesses = nearer(searched(data, s, some(wide, kSearched), Eigen::VectorXd::Zero(kTraverseValues),
-                                       starts, kFirstNoise * data.width / data.load_noise, bounces(data)));
+  const Fits guesses = nearer(traverse_guesses(data, s, wide, Eigen::VectorXd::Zero(kTraverseValues), starts,
+                                               kFirstNoise * data.width / data.load_noise));
   if (guesses.empty())
     throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
-  fill(e, solve(data, s, chosen, guesses), data, s);
+  fill(e, solve_traverse(data, s, chosen, guesses), data, s);
 }
 
 void require_crossings(const TraverseData& data, int fewest) {
@@ -443,9 +243,10 @@ void by_motor(Estimate& e, const record::Record& record, const GapTraverseSettin
   const TraverseData first = first_data(record, s);
   require_crossings(first, kFewestFirst);
   std::vector<double> starts;
-  for (const double factor : kGuesses) starts.push_back(factor * std::max(s.gap, first.level / s.stiffness));
+  for (const double factor : kGapFactors)
+    starts.push_back(factor * std::max(s.gap, first.level / s.stiffness));
   const Fits early =
-      searched(first, s, some(first.windows, kSearched), Eigen::VectorXd::Zero(kTraverseValues), starts, 1);
+      traverse_guesses(first, s, first.windows, Eigen::VectorXd::Zero(kTraverseValues), starts, 1);
   if (early.empty())
     throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
   TraverseData data = second_data(record, s, early.front());
@@ -454,10 +255,10 @@ void by_motor(Estimate& e, const record::Record& record, const GapTraverseSettin
   add_waves(data, orders_of_waves(early.front(), first, s.motor_turn));
   starts.clear();
   for (const TraverseFit& fit : early) starts.push_back(fit.gap());
-  const Fits guesses = searched(data, s, some(data.windows, kSearched), early.front().fit.shared, starts, 1);
+  const Fits guesses = traverse_guesses(data, s, data.windows, early.front().fit.shared, starts, 1);
   if (guesses.empty())
     throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
-  fill(e, solve(data, s, data.windows, guesses), data, s);
+  fill(e, solve_traverse(data, s, data.windows, guesses), data, s);
 }
 
 }  // namespace
