@@ -85,8 +85,7 @@ struct Train {
 
   /// At penetration `depth` [m], approaching at `rate` [m/s]: N, no tension.
   DIAGNOSIS_LANES Lanes push(const Lanes& depth, const Lanes& rate) const {
-    Lanes times = 1 + loss * rate;
-    if constexpr (Lacking) times += hysteresis * rate / (magnitude(rate) + kClosing);
+    const Lanes times = 1 + loss * rate + hysteresis * rate / (magnitude(rate) + kClosing);
     if constexpr (Law == Teeth::hertz) return contact * depth * root(depth) * shape(depth) * positive(times);
     const Lanes spring = Law == Teeth::line ? contact * depth : contact * lanes_power(depth, exponent);
     const Lanes force = positive(spring * shape(depth) * times + contact_damping * rate);

@@ -4,14 +4,15 @@
 //
 //   Jm qm'' = tau + offset + slope qm - cm qm' - dry sat(qm' / friction_speed) - T     sat(x): x within +-1
 //   Jp qp'' = T - F rb                       T = Ki (qm - qp) + Ci (qm' - qp')
-//   Jg qg'' = F rb - Ko qg - Co qg'          F = K d^1.5 max(0, 1 + 3/2 alpha d'),  d = |rb (qp - qg)| - gap
+//   Jg qg'' = F rb - Ko qg - Co qg'          F = K d^1.5 max(0, 1 + 3/2 alpha d' + h d' / (|d'| + 1 mm/s)),
+//   d = |rb (qp - qg)| - gap
 //
 // with a free link instead of the locked output as in waveform.h. What a rig file may lack comes in beside
 // it (theory of each: model/terms): motor friction that falls with speed and grows with T, quadratic drag,
-// dry friction of the pinion, teeth of another exponent and with hysteresis,
+// dry friction of the pinion, teeth of another exponent,
 //
 //   dry -> max(0, dry + s exp(-(qm' / (3 friction_speed))^2) + l |T|),  cm -> cm + q |qm'|
-//   F -> F (d / d0)^e,  1 + 3/2 alpha d' -> 1 + 3/2 alpha d' + h d' / (|d'| + 1 mm/s)
+//   F -> F (d / d0)^e
 //
 // with d0 the penetration under the usual torque.
 //
@@ -64,14 +65,14 @@ enum WaveformValue {
   kDriveOffset,       // N m
   kDriveSlope,        // N m/rad
   kPositionZero,      // rad
+  kTeethHysteresis,   // h, -
   // What a rig file may lack.
-  kStribeck,         // s, N m
-  kLoadFriction,     // l, -
-  kDrag,             // q, N m s^2/rad^2
-  kPinionFriction,   // N m, < 0 counts as 0
-  kTeethExponent,    // e, -
-  kTeethHysteresis,  // h, -
-  kSensorCurve,      // -
+  kStribeck,        // s, N m
+  kLoadFriction,    // l, -
+  kDrag,            // q, N m s^2/rad^2
+  kPinionFriction,  // N m, < 0 counts as 0
+  kTeethExponent,   // e, -
+  kSensorCurve,     // -
   kGlobalValues,
   kStartTwist = kGlobalValues,  // N m: Ki (qm - qp), towards the flank that is loaded
   kStartFlank,                  // N m: torque on that flank; < 0: off it by -kStartFlank / Ki

@@ -19,12 +19,12 @@ constexpr double kWideGap = 3;          // spread of the logarithm of the gap: n
 constexpr double kGapStep = 3e-4;       // of the logarithm, about its standard error, of a difference
 constexpr double kLeastStep = 1e-4;     // the same of values that are known better than a tenth
 constexpr double kCurrentLoop = 3e-4;   // s, of a current loop
+constexpr double kHysteresis = 0.05;    // steel teeth lose some per cent; no rig file has it
 // What a rig file may lack. Spreads are what such machines have.
-constexpr double kDragSpeed = 10;            // rad/s
-constexpr double kForeignPinion = 0.02;      // of the level
-constexpr double kForeignExponent = 0.1;     // Hertz's 1.5 against what measured teeth have, 1.1 to 1.6
-constexpr double kForeignHysteresis = 0.05;  // steel teeth lose some per cent
-constexpr double kForeignCurve = 0.01;       // of a strain gauge's gain from nothing to the level
+constexpr double kDragSpeed = 10;         // rad/s
+constexpr double kForeignPinion = 0.02;   // of the level
+constexpr double kForeignExponent = 0.1;  // Hertz's 1.5 against what measured teeth have, 1.1 to 1.6
+constexpr double kForeignCurve = 0.01;    // of a strain gauge's gain from nothing to the level
 
 double friction_spread(double declared, const WaveformData& data) {
   return std::isnan(declared) ? WaveformSpread::kDryFriction * data.level : declared;
@@ -47,6 +47,7 @@ void put_what_it_has(const WaveformSettings& s, const WaveformData& data, Wavefo
   put(p, kLinkInertia, s.link_inertia, s.spread.link_inertia, true);
   put(p, kLinkDamping, s.link_damping, s.spread.link_damping, true);
   put(p, kLinkFriction, s.link_friction, friction_spread(s.spread.link_friction, data), false);
+  put(p, kTeethHysteresis, 0, kHysteresis, false);
 }
 
 void put_what_it_lacks(const WaveformData& data, bool lacking, WaveformPriors& p) {
@@ -56,7 +57,6 @@ void put_what_it_lacks(const WaveformData& data, bool lacking, WaveformPriors& p
   put(p, kDrag, 0, times * kForeignTorque * data.level / (kDragSpeed * kDragSpeed), false);
   put(p, kPinionFriction, 0, times * kForeignPinion * data.level, false);
   put(p, kTeethExponent, 0, times * kForeignExponent, false);
-  put(p, kTeethHysteresis, 0, times * kForeignHysteresis, false);
   put(p, kSensorCurve, 0, times * kForeignCurve, false);
 }
 

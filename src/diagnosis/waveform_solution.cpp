@@ -381,12 +381,12 @@ const char* waveform_value_name(int which) {
                                                    "offset of the drive",
                                                    "slope of the drive",
                                                    "zero of the position",
+                                                   "hysteresis of the teeth",
                                                    "Stribeck friction",
                                                    "load-dependent friction",
                                                    "quadratic drag",
                                                    "dry friction of the pinion",
                                                    "exponent of the teeth",
-                                                   "hysteresis of the teeth",
                                                    "curve of the sensor"};
   return names[which];
 }

@@ -4,7 +4,7 @@
 // the motor's position where that is recorded, about the reversals of the motor's torque:
 //
 //   Jm qm'' = tau - cm qm' - dry(qm') - T        T = Ki (qm - qp) + Ci (qm' - qp')
-//   Jp qp'' = T - F rb                           F = max(0, K d^n (1 + 3/2 alpha d') + c d')
+//   Jp qp'' = T - F rb                           F = max(0, K d^n (1 + 3/2 alpha d' + h sign(d')) + c d')
 //   Jg qg'' = F rb - Ko qg - Co qg'              d = |rb (qp - qg)| - backlash / 2
 //
 // (Sarkar, Ellis and Moore 1997, Eqs. 1 to 12, whose output is locked). Where the link is free, its inertia
@@ -16,7 +16,9 @@
 // No declared value has to be right, only its spread. What the spreads below are where the rig file does not
 // say them is a choice: what data sheets and drawings are good for.
 //
-// The exponent n is as declared; alpha or c may be absent. A mesh of angles has rb = 1: d in rad, F in N m.
+// The exponent n is as declared; alpha or c may be absent. No rig file has the hysteresis h of the teeth: all
+// teeth have some per cent, and without it torque alone shows too large a play. A mesh of angles has rb = 1:
+// d in rad, F in N m.
 //
 // Symmetry of torque alone: with inertias, damping and stiffnesses times s, the contact's K times s^n and its
 // alpha and c times s, and the backlash divided by s, the torque is the same. From torque alone the play is
@@ -32,14 +34,15 @@
 // machine does not follow lose weight. Where the plain machine leaves more than noise (1 % of the swing of
 // the torque, 0.06 % of that of the position) it is fitted once more with what a rig file may lack, each with
 // "nothing, give or take what such machines have": motor friction that falls with speed or grows with the
-// load, quadratic drag, friction of the pinion, teeth of another exponent or with hysteresis, a curved
-// sensor. What is left then is the same from sample to sample within half a cycle and from window to window,
-// and counts that much more as noise.
+// load, quadratic drag, friction of the pinion, teeth of another exponent, a curved sensor. What is left then
+// is the same from sample to sample within half a cycle and from window to window, and counts that much more
+// as noise.
 //
 // An answer passes five gates:
 //
-//   a sampled torque drives with 3 % of noise at most                     beyond it answers were wrong and
-//   sure half of the reversals are followed 5 % of the swing of a channel at most are left that are no noise
+//   a sampled torque drives with 3 % of noise at most: beyond it answers were wrong and sure
+//   half of the reversals are followed
+//   5 % of the swing of a channel at most are left that are no noise
 //   inertias and the sensor's stiffness are within four spreads of the declared ones
 //   plays that fit alike (chi^2 of three standard errors) are within a factor of four
 //
