@@ -40,9 +40,10 @@ std::string together_not_borne_out(const Hypothesis& h, const Hypothesis& declar
   });
   if (!better) return "the unseen record is told no better than by the declared machine";
   const UnseenSize before(was), after(is);
-  const double half = context.settings.revision.half;
+  const double half = context.settings.revision.half, near_floor = context.settings.acceptance.near_floor;
   if (simulation::load_moves_freely(h.declared->rig) &&
-      after.most() > context.settings.acceptance.near_floor && after.square() > half * before.square())
+      std::max(misfit(h).torque, misfit(h).deflection) > near_floor && after.most() > near_floor &&
+      after.square() > half * before.square())
     return fmt::format(
         "of the unseen record {:.0f} % of the square is left, far above the noise: it may stand in for an "
         "effect that has no name",

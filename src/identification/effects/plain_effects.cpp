@@ -78,35 +78,43 @@ Effect effect_of(const Plain& best, const std::vector<Plain>& plain, const Searc
   return effect;
 }
 
-/// With the first, or with the same on another body where that, fitted with the machine, leaves less: both
-/// sums hardly show on which body a friction acts, and the motion of the load does.
+/// Fitted with the machine, the best of those that explain nearly as much of the same channel; of those that
+/// come to the same the simplest. Both sums hardly show on which body a friction acts or which wave the
+/// flanks have, and the motion of the load does.
 std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain>& plain,
                                     const SearchContext& context) {
-  std::optional<Hypothesis> best;
+  const SearchSettings& settings = context.settings;
+  const Plain& first = plain.front();
+  const bool usual = is_usual(first.candidate, h.declared->rig);
+  std::vector<Hypothesis> fitted;
   for (const Plain& p : plain) {
-    if (p.candidate.id != plain.front().candidate.id) continue;
+    const bool alike = p.explained.deflection == first.explained.deflection &&
+                       p.explained.gain_held_out >= settings.revision.alike * first.explained.gain_held_out;
+    if (p.candidate.id != first.candidate.id && (usual || !alike)) continue;
     std::vector<Effect> effects = h.effects;
-    effects.push_back(effect_of(p, plain, context.settings));
-    auto with = refitted(h, std::move(effects), context);
-    if (with && (!best || size(*with) < size(*best))) best = std::move(with);
+    effects.push_back(effect_of(p, plain, settings));
+    if (auto with = refitted(h, std::move(effects), context)) fitted.push_back(std::move(*with));
   }
-  return best;
+  if (fitted.empty()) return std::nullopt;
+  const auto least = std::min_element(fitted.begin(), fitted.end(),
+                                      [](const auto& a, const auto& b) { return size(a) < size(b); });
+  const double enough = settings.revision.as_good * size(*least);
+  fitted.erase(std::remove_if(fitted.begin(), fitted.end(), [&](const auto& f) { return size(f) > enough; }),
+               fitted.end());
+  return *std::min_element(fitted.begin(), fitted.end(), [](const auto& a, const auto& b) {
+    return unknowns(a.effects.back().candidate) < unknowns(b.effects.back().candidate);
+  });
 }
 
 }  // namespace
 
-Hypothesis add_plain_effects(const Hypothesis& before, const SearchContext& context) {
-  Hypothesis h = before;
+Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context) {
   if (!simulation::load_moves_freely(h.declared->rig)) return h;
-  while (h.effects.size() < context.settings.asked.most_effects) {
-    context.tell("looking at the balance of torques and at the pressed flanks");
-    const std::vector<Plain> plain = plain_candidates(h, context);
-    if (plain.empty()) return h;
-    const auto with = with_best(h, plain, context);
-    if (!with) return h;
-    h = with_best_shapes(*with, context);
-  }
-  return h;
+  context.tell("looking at the balance of torques and at the pressed flanks");
+  const std::vector<Plain> plain = plain_candidates(h, context);
+  if (plain.empty()) return h;
+  const auto with = with_best(h, plain, context);
+  return with && size(*with) < size(h) ? with_best_shapes(*with, context) : h;
 }
 
 }  // namespace backlash::identification

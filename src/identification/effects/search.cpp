@@ -64,20 +64,33 @@ Hypothesis believe_all(const Hypothesis& before, const Hypothesis& declared, con
   return together.fitted == h.fitted ? h : believe_physical(together, unseen, context);
 }
 
-/// What two encoders show plainly, where the unseen record bears out one that has a name; or no more than
-/// every machine has.
+/// What two encoders show plainly, one effect after the other, as long as the unseen record bears all of them
+/// out: one that is not there would spoil those before it. Or no more than every machine has.
 std::optional<Hypothesis> plain_effects(const Hypothesis& declared, const ServoData& unseen,
                                         const SearchContext& context) {
   const auto named = [](const Hypothesis& h) {
     return std::any_of(h.effects.begin(), h.effects.end(),
                        [&](const Effect& effect) { return !is_usual(effect.candidate, h.declared->rig); });
   };
-  Hypothesis h = add_plain_effects(declared, context);
-  if (h.effects.empty()) return std::nullopt;
-  h = add_shape_of_friction(h, context);
-  if (!named(h)) return h;
-  h = believe_all(h, declared, unseen, context);
-  return named(h) ? std::optional(h) : std::nullopt;
+  std::optional<Hypothesis> found;
+  for (Hypothesis h = declared; h.effects.size() < context.settings.asked.most_effects;) {
+    const Hypothesis more = add_plain_effect(h, context);
+    if (more.effects.size() == h.effects.size()) break;
+    h = more;
+    const Hypothesis whole = add_shape_of_friction(h, context);
+    if (!named(whole)) {
+      found = whole;
+      continue;
+    }
+    const Hypothesis believed = believe_all(whole, declared, unseen, context);
+    const bool all = believed.effects.size() == whole.effects.size();
+    if (!all && found && named(*found)) return found;
+    if (named(believed))
+      found = believed;
+    else
+      found.reset();
+  }
+  return found;
 }
 
 }  // namespace

@@ -19,9 +19,8 @@ bool is_usual(const Candidate& candidate, const model::Rig& rig);
 /// How friction builds up after a reversal, where that is usual and lessens what is left.
 Hypothesis add_shape_of_friction(const Hypothesis& h, const SearchContext& context);
 
-/// Named effects that two encoders show plainly, each in turn by that which explains most; none of a machine
-/// with one.
-Hypothesis add_plain_effects(const Hypothesis& h, const SearchContext& context);
+/// One more named effect, that which two encoders show plainly to explain most; none of a machine with one.
+Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context);
 
 /// One more named effect: the first of the best trials that convinces and that the machine can be fitted
 /// with.
