@@ -79,6 +79,28 @@ Effect effect_of(const Plain& best, const std::vector<Plain>& plain, const Searc
   return effect;
 }
 
+/// Where the machine's values are those of its file.
+Hypothesis as_declared(const Hypothesis& h) {
+  Hypothesis declared = h;
+  BandFit fitted = *h.fitted;
+  fitted.fit.machine.rig = h.declared->rig;
+  fitted.fit.machine.calibrations = h.declared->calibrations;
+  declared.fitted = std::make_shared<const BandFit>(std::move(fitted));
+  return declared;
+}
+
+/// With one more effect, fitted from the values of the machine without it or, as these may have been bent to
+/// stand in for it, from those of the file.
+std::optional<Hypothesis> with_effect(const Hypothesis& h, const Effect& effect,
+                                      const SearchContext& context) {
+  std::vector<Effect> effects = h.effects;
+  effects.push_back(effect);
+  auto with = refitted(h, effects, context);
+  if (!h.effects.empty()) return with;
+  auto other = refitted(as_declared(h), std::move(effects), context);
+  return other && (!with || size(*other) < size(*with)) ? other : with;
+}
+
 /// Fitted with the machine, the best of those that explain nearly as much of the same channel; of those that
 /// come to the same the simplest. Both sums hardly show on which body a friction acts or which wave the
 /// flanks have, and the motion of the load does.
@@ -92,9 +114,8 @@ std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain
     const bool alike = p.explained.deflection == first.explained.deflection &&
                        p.explained.gain_held_out >= settings.revision.alike * first.explained.gain_held_out;
     if (p.candidate.id != first.candidate.id && (usual || !alike)) continue;
-    std::vector<Effect> effects = h.effects;
-    effects.push_back(effect_of(p, plain, settings));
-    if (auto with = refitted(h, std::move(effects), context)) fitted.push_back(std::move(*with));
+    if (auto with = with_effect(h, effect_of(p, plain, settings), context))
+      fitted.push_back(std::move(*with));
   }
   if (fitted.empty()) return std::nullopt;
   const auto least = std::min_element(fitted.begin(), fitted.end(),

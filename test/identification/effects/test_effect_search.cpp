@@ -109,7 +109,7 @@ TEST(EffectSearch, WhatEveryMachineHasIsNotedAndNotCalledMissing) {
   EXPECT_EQ(found(trace), std::set<std::string>{"cogging"});
   EXPECT_NEAR(parameter(trace, "cogging", "amplitude").value, 15, 0.05 * 15);
   ASSERT_EQ(trace.notes.size(), 1u);
-  EXPECT_NE(trace.notes[0].find("asymmetric_coulomb (torque"), std::string::npos) << trace.notes[0];
+  EXPECT_NE(trace.notes[0].find("asymmetric_coulomb, torque"), std::string::npos) << trace.notes[0];
   EXPECT_NEAR(trace.augmented.terms.back()->values.at("torque"), 5, 0.1 * 5);
   EXPECT_FALSE(trace.unexplained);
   expect_at_floor(trace);
