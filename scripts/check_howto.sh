@@ -33,14 +33,15 @@ for page in "${pages[@]}"; do
   status=0
   (
     cd "${work}"
-    export HOME=${work}/home ROS_HOME=${work}/ros_home ROS_LOG_DIR=${work}/ros_log ROS_MASTER_URI
+    unset ROS_HOME  # the reader's is ~/.ros
+    export HOME=${work}/home ROS_LOG_DIR=${work}/ros_log ROS_MASTER_URI
     ROS_MASTER_URI=http://localhost:$(free_port)
     mkdir bin
     printf '#!/bin/sh\nexec %s -p %s\n' "$(command -v roscore)" "${ROS_MASTER_URI##*:}" >bin/roscore
     chmod +x bin/roscore
     PATH=${work}/bin:${PATH}
     # shellcheck disable=SC2016
-    timeout -k 5 600 bash -E -c 'stop() { kill $(jobs -p); for i in {1..100}; do [[ -n $(jobs -rp) ]] || return; sleep 0.1; done; kill -9 $(jobs -p); }
+    timeout -k 5 1800 bash -E -c 'stop() { kill $(jobs -p); for i in {1..100}; do [[ -n $(jobs -rp) ]] || return; sleep 0.1; done; kill -9 $(jobs -p); }
       trap '\''s=$?; ((s <= 3)) || { echo "exit code $s of: $BASH_COMMAND" >&2; stop; exit 1; }'\'' ERR
       source commands.sh </dev/null
       trap - ERR
