@@ -14,9 +14,10 @@ namespace {
 
 constexpr double kMissing = 0.5;   // theory: of an interval, half of what one lost sample adds
 constexpr double kJitters = 0.01;  // choice: of an interval, standard deviation worth a look at the motion
-constexpr double kTells = 0.5;     // theory: one of the two readings leaves nothing where the other is wrong
-constexpr double kOnGrid = 0.5;    // theory: of an interval, beyond which a stamp is nearer to another row
-constexpr double kSteady = 0.2;    // choice: of the speed, by which it may change across a step of the clock
+constexpr double kClearlyBetter =
+    0.5;                         // theory: one of the two readings leaves nothing where the other is wrong
+constexpr double kOnGrid = 0.5;  // theory: of an interval, beyond which a stamp is nearer to another row
+constexpr double kSteady = 0.2;  // choice: of the speed, by which it may change across a step of the clock
 constexpr double kClearMotion = 20;  // choice: steps of the sensor that a speed must pass to be one
 
 /// Samples missing between i and i + 1: a late sample is followed by a short interval, a lost one is not.
@@ -87,7 +88,7 @@ bool samples_are_even(const RecordLook& look) {
       by_stamps += std::pow(on_line - share * way, 2);
       evenly += std::pow(on_line - 0.5 * way, 2);
     }
-    return evenly < kTells * by_stamps;
+    return evenly < kClearlyBetter * by_stamps;
   }
   return false;
 }

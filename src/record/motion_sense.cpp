@@ -106,7 +106,7 @@ void look_at_lag(const DrivenMotion& m, std::vector<Finding>& found) {
              "load_position is ahead of motor_position whenever both gain speed: the load would pull the "
              "motor; the "
              "columns are in each other's place");
-  } catch (const CannotIdentify&) {  // a motion that does not tell them apart
+  } catch (const CannotIdentify&) {  // a motion that does not distinguish them
   }
 }
 
@@ -128,7 +128,7 @@ struct Spent {
   double inertia = 0, inertia_share = 0, friction_share = 0, left = 1;
 };
 
-/// All 0 of a motion that does not tell them apart. `weight`: it may also be spent on gravity or a spring.
+/// All 0 of a motion that does not distinguish them. `weight`: it may also be spent on gravity or a spring.
 Spent spent(const Driven& d, bool weight, bool linear) {
   const auto n = Eigen::Index(d.torque.size());
   const double stands = kStands * varying(d.speed).norm() / std::sqrt(double(n)),
