@@ -274,7 +274,7 @@ bool is_urdf(const std::string& path) {
 bool is_arm_rig(const std::string& path) {
   if (is_urdf(path))
     throw BadData(path,
-                  "is a URDF: what is needed is a rig file, which names it and tells the drives; "
+                  "is a URDF: what is needed is a rig file, which names it and describes the drives; "
                   "plan_motion writes one (--write-rig) to begin with");
   return YamlReader::from_file(path).has("urdf");
 }
