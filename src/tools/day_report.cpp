@@ -59,10 +59,10 @@ int exit_code(const report::Day& day) {
   const auto worse = [&code](int other) { code = code == kInconclusive ? other : std::max(code, other); };
   for (const report::JointDay& joint : day.joints) {
     if (!joint.changes.empty()) worse(kFault);
-    const auto told = std::find_if(joint.estimates.rbegin(), joint.estimates.rend(), report::tells);
-    if (told == joint.estimates.rend()) continue;
-    worse(told->grade == "service" || told->grade == "stop" ? kFault
-          : told->grade == "watch"                          ? kWatch
+    const auto last = std::find_if(joint.estimates.rbegin(), joint.estimates.rend(), report::has_play);
+    if (last == joint.estimates.rend()) continue;
+    worse(last->grade == "service" || last->grade == "stop" ? kFault
+          : last->grade == "watch"                          ? kWatch
                                                             : kHealthy);
   }
   return code == kHealthy && report::silent(day) ? kInconclusive : code;

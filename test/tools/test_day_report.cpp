@@ -88,7 +88,7 @@ TEST_F(DayReport, AJointOfWhichNothingCanBeToldIsCounted) {
   history("elbow", "cannot_tell", std::nan(""));
   const Json told = day(3);
   EXPECT_EQ(told["joints"][0]["told"], 0);
-  expect_contains(told["summary"].get<std::string>(), "of 1 no estimate told the play");
+  expect_contains(told["summary"].get<std::string>(), "of 1 no estimate states the play");
 }
 
 /// A folder that nobody writes any more is not reported as today's.
