@@ -243,10 +243,10 @@ void ChangeLedger::restore(const std::vector<KnownChange>& told) {
   }
 }
 
-std::vector<KnownChange> ChangeLedger::told() const {
+std::vector<KnownChange> ChangeLedger::reported() const {
   std::vector<KnownChange> all;
   std::copy_if(known_.begin(), known_.end(), std::back_inserter(all),
-               [](const KnownChange& k) { return k.told(); });
+               [](const KnownChange& k) { return k.reported(); });
   return all;
 }
 

@@ -67,7 +67,7 @@ struct KnownChange {
   long ends = 0;          // the change that this one undoes, by id; 0: none. Not told by itself
   bool differed = false;  // a look at the time after its onset saw the machine differ from its beginning
   int alike = 0;          // looks in a row, since then, that saw no difference
-  bool told() const { return id > 0; }
+  bool reported() const { return id > 0; }
 };
 
 class ChangeLedger {
@@ -82,7 +82,7 @@ class ChangeLedger {
   void restore(const std::vector<KnownChange>& told);
 
   /// All that were told, the oldest first; at most kMostKnown.
-  std::vector<KnownChange> told() const;
+  std::vector<KnownChange> reported() const;
   const KnownChange& change(long id) const;
 
   /// Effects that the last looks had from the beginning of their stretch, while no standing change explains

@@ -90,7 +90,7 @@ void healthy(const Options& options) {
       }
     }
     seconds += stream.time.back();
-    for (const diagnosis::KnownChange& c : ledger.told()) {
+    for (const diagnosis::KnownChange& c : ledger.reported()) {
       ++told;
       const double size = c.found.size.empty() ? 0 : c.found.size.front().value;
       fmt::print(
