@@ -17,7 +17,7 @@ Command command() {
   Command c;
   c.name = "day_report";
   c.summary =
-      "Writes a page of the last day of a robot's joints: how much play each had, when that could be told, "
+      "Writes a page of the last day of a robot's joints: how much play each had, when that was estimated, "
       "and "
       "what has changed since when.";
   c.positional = {"HISTORY_FOLDER"};
@@ -35,10 +35,10 @@ Command command() {
       "JOINT_changes.csv of each joint. It may be read while they write.";
   c.examples = {"day_report ~/history --out day.html", "day_report ~/history --hours 168 --out week.html"};
   c.exit_codes =
-      "  0   no change, all that was told is good\n"
+      "  0   no change, all grades are good\n"
       "  1   watch: the last grade of a joint\n"
       "  2   a joint has changed, or its last grade is service or stop\n"
-      "  3   no estimate told the play of any joint, and no change; or all were good, and nothing "
+      "  3   no estimate states the play of any joint, and no change; or all were good, and nothing "
       "was reported since\n";
   return c;
 }
