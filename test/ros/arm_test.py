@@ -103,10 +103,10 @@ class ArmTest(unittest.TestCase):
         reports = Inbox("/watched/changes", ChangeReport)
 
         def looked(messages):
-            """The status once three looks could tell."""
+            """The status once three looks have an answer."""
             for status in (s for m in reversed(messages) for s in m.status if s.name.endswith("two_link_arm: model")):
                 values = {v.key: v.value for v in status.values}
-                return (status, values) if int(values["Looks that could tell"]) >= 3 else None
+                return (status, values) if int(values["Looks with an answer"]) >= 3 else None
             return None
         status, values = Inbox("/diagnostics", DiagnosticArray).wait_for(looked, "looks")
         self.assertEqual((status.level, reports.messages), (DiagnosticStatus.OK, []), status.message)
