@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kRowsPerCycle = 5;         // choice: of torque_cutoff; two would do for a perfect low-pass
 constexpr double kEdge = 1;                 // cycles of torque_cutoff that a low-pass needs to settle; choice
-constexpr int kNoiseOrder = 3;              // of the differences that tell white noise; choice
+constexpr int kNoiseOrder = 3;              // of the differences that show white noise; choice
 constexpr double kLargestDeflection = 0.1;  // rad, of a gear between its encoders; choice
 constexpr double kBackwards = 2;  // theory: 0 of an encoder that follows, 1 of one of two that rest; choice
 /// Theory: of white noise at sampling interval T, low_pass(f) leaves the variance share 2 T f times the

@@ -39,7 +39,7 @@ class EffectSteps {
   JointEffectsFound& found_;
 };
 
-/// That friction is another one is known; which one remains to be told, however small it is.
+/// Friction is known to be another one; which one is still to be reported, however small it is.
 ArmTraceSettings EffectSteps::settings_for_other_friction() const {
   ArmTraceSettings settings = fits_.settings;
   settings.least_at_joint = settings.least_gain;
@@ -124,7 +124,7 @@ std::optional<Candidate> EffectSteps::other_friction(const Candidate& model, std
 void EffectSteps::drop_what_does_not_explain(const Candidate& model) const {
   if (found_.steps.empty()) return;
   const Candidate last = found_.steps.back();
-  const std::vector<double> expected = fits_.foretold(last, judged_),
+  const std::vector<double> expected = fits_.expected_errors(last, judged_),
                             errors = relative_errors(last.fit, last.freedom, as_fitted(judged_, true), 0);
   const auto left_of = [&](const Candidate& c) {
     const std::size_t joint = c.freedom.effects.back().joint;
