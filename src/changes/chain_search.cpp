@@ -10,7 +10,7 @@
 namespace backlash::changes {
 namespace {
 
-/// What a body that an arm carries is at most, one standard deviation, so that what the motion does not tell
+/// What a body that an arm carries is at most, one standard deviation, so that what the motion does not show
 /// stays 0. Choice: the largest arms of this kind carry some 10 kg, half a metre out.
 Eigen::VectorXd largest_body() {
   Eigen::VectorXd sd(10);
@@ -124,7 +124,7 @@ bool ChainSearch::believed(const FoundChainChange& f) const {
   return f.score.gain / (f.inflation * noisier(f)) > threshold;
 }
 
-/// An end, where the record with it is told clearly better: what was taken is put down again.
+/// An end, where the record with it is explained clearly better: what was taken is put down again.
 void ChainSearch::find_end(FoundChainChange& f, const Sums& sums) const {
   FoundChainChange ended = f;
   for (int round = 0; round < 3; ++round) {
@@ -154,7 +154,7 @@ void ChainSearch::set_onset(FoundChainChange& f, const Sums& sums) const {
   f.high = settings_.block * double(high) + least;
 }
 
-/// A body that an arm may carry, or may have lost: its mass is told, and within reach. A slip that is small
+/// A body that an arm may carry, or may have lost: its mass is known, and within reach. A slip that is small
 /// enough for its slope to be straight.
 bool ChainSearch::plausible(const FoundChainChange& f) const {
   if (f.score.values.size() == 0) return false;

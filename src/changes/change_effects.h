@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The effects that a record can tell, as columns: the motor torque, or the deflection, that one unit of each
+// The effects that a record can show, as columns: the motor torque, or the deflection, that one unit of each
 // value takes.
 #pragma once
 

@@ -10,7 +10,7 @@
 
 namespace backlash::changes {
 
-constexpr double kToldApart = 1e-3;  // - of its squares that an effect must have for itself. Choice
+constexpr double kLeastOwn = 1e-3;  // - of its squares that an effect must have for itself. Choice
 
 /// What is known beside the effect: residual, nuisances, variance of the noise.
 struct Background {
@@ -44,7 +44,7 @@ class EffectSums {
     Eigen::VectorXd values;
     Eigen::MatrixXd covariance;
   };
-  /// From block `from` to before block `to`. No values where the record cannot tell.
+  /// From block `from` to before block `to`. No values where the record does not determine them.
   Score score(std::size_t from, std::size_t to, const Background& background) const;
 
   /// What that follows from; those of several channels that share the effect's values add up.

@@ -123,7 +123,7 @@ FoundChange ChangeSearch::scanned(const ChangeEffect& e, const Background& b, st
 /// Whether `most` explains a good part of what `f` leaves.
 bool ChangeSearch::leaves_more(const FoundChange& f, const FoundChange& most, const Background& b) const {
   const double more = most.score.gain - f.score.gain;
-  if (more < settings_.told_apart * scores_.inflation(most.effect)) return false;
+  if (more < settings_.distinguished * scores_.inflation(most.effect)) return false;
   double rows = 0;
   left_after(b, most.from, most.to, rows);
   const double left = (b.misfit() - f.score.gain) * rows / double(motion_.size());
@@ -154,13 +154,13 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
   FoundChange found = *simplest;
   found.inflation = scores_.inflation(found.effect);
   found.gain = found.score.gain / found.inflation;
-  // A weak change is told apart from others by noise alone.
-  const double not_told =
-      std::min(alike, most->score.gain - settings_.told_apart * scores_.inflation(most->effect));
+  // A weak change is distinguished from others by noise alone.
+  const double as_likely =
+      std::min(alike, most->score.gain - settings_.distinguished * scores_.inflation(most->effect));
   for (const FoundChange& f : all)
-    if (f.score.gain >= not_told && f.effect.id != found.effect.id) {
-      const bool told = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();
-      if (!told) found.alike.push_back(f.effect.id);
+    if (f.score.gain >= as_likely && f.effect.id != found.effect.id) {
+      const bool listed = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();
+      if (!listed) found.alike.push_back(f.effect.id);
     }
   return found;
 }
@@ -172,7 +172,7 @@ Eigen::VectorXd ChangeSearch::left_with(const FoundChange& f, const Background& 
   return without - b.columns * (b.inverse * (b.columns.transpose() * without / b.variance));
 }
 
-/// Its values where friction may not wander beside it; none where the record cannot tell so.
+/// Its values where friction may not wander beside it; none where the record does not determine them so.
 Eigen::VectorXd ChangeSearch::values_without_wander(const FoundChange& f, const Background& b) const {
   Background steady = b;
   steady.spread.segment(first_.wander, first_.wanders).setConstant(kNone);
@@ -347,7 +347,7 @@ std::vector<FoundChange> ChangeSearch::run() {
   return found;
 }
 
-Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& all, bool linear) const {
+Change ChangeSearch::change_of(const FoundChange& f, const std::vector<FoundChange>& all, bool linear) const {
   std::vector<FoundChange> others;
   for (const FoundChange& o : all)
     if (o.from != f.from || o.effect.name() != f.effect.name()) others.push_back(o);

@@ -42,7 +42,7 @@ class ChangeSearch {
   std::size_t blocks() const { return blocks_; }
   double threshold(Eigen::Index values) const;
   std::size_t windows() const;
-  Change told(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
+  Change change_of(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
   bool explained(const std::vector<FoundChange>& all) const;
   /// A change is there of which a fault at one place is the nearest, and others have a share in it.
   bool like_fault() const { return like_fault_; }
@@ -105,7 +105,7 @@ class ChangeSearch {
   Eigen::Index beside_column_ = 0, beside_columns_ = 0;  // the first of what stands beside, and how many
   std::vector<std::string> different_;                   // effects that the record has from its beginning
   bool like_fault_ = false;
-  std::optional<FoundChange> left_by_shape_;  // the likeliest beside those found, too little to be told
+  std::optional<FoundChange> left_by_shape_;  // the likeliest beside those found, too little to be reported
   const std::size_t margin_, blocks_;
 };
 

@@ -17,7 +17,7 @@ void ChangeSearch::refine_onset(FoundChange& f, const EffectSums& sums, const Ba
   }
 }
 
-/// An end, where the record with it is told clearly better.
+/// An end, where the record with it is explained clearly better.
 void ChangeSearch::find_end(FoundChange& f, const Background& b) const {
   const EffectSums sums = sums_of(f, b);
   FoundChange ended = f;
@@ -63,8 +63,8 @@ void ChangeSearch::onset_interval(const FoundChange& f, const EffectSums& sums, 
   change.since_to = motion_.start + settings_.block * double(high) + settings_.block + settings_.onset_least;
 }
 
-/// The onset of a change whose shape leaves something, or that comes with another too small to be told: of
-/// both together, and by itself.
+/// The onset of a change whose shape leaves something, or that comes with another too small to be reported:
+/// of both together, and by itself.
 void ChangeSearch::onset_with_left(const FoundChange& f, const Background& b, Change& change) const {
   if (!left_by_shape_ || f.effect.ramp || left_by_shape_->effect.ramp) return;
   const double apart = std::fabs(double(left_by_shape_->from) - double(f.from)) * settings_.block;

@@ -25,7 +25,7 @@ constexpr double kOthers =
 
 }  // namespace
 
-/// The likeliest fault of one place, if passes tell it.
+/// The likeliest fault of one place, if passes show it.
 std::optional<FoundChange> ChangeSearch::best_fault(const Background& b) const {
   std::optional<FoundChange> best;
   const double least = threshold(2);
@@ -105,7 +105,7 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
   both << z,
       f.score.values[0] / (2 * kSlope) * (*effect_columns(motion_, more) - *effect_columns(motion_, less));
   const EffectSums::Score s = EffectSums(motion_, both, b, settings_.block, false).score(f.from, f.to, b);
-  Eigen::Matrix2d covariance = Eigen::Vector2d(f.score.values.squaredNorm(), 1).asDiagonal();  // not told
+  Eigen::Matrix2d covariance = Eigen::Vector2d(f.score.values.squaredNorm(), 1).asDiagonal();  // not known
   if (s.values.size() == 2) covariance = s.covariance * f.inflation * std::max(1.0, noisier);
   covariance(0, 0) += std::pow(settings_.model_error * f.score.values[0], 2);
   std::vector<ChangeSize> size =
@@ -117,7 +117,7 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
   return size;
 }
 
-/// Told by passes through its place without the one that says most: a push is at one place as well.
+/// Shown by passes through its place without the one that says most: a push is at one place as well.
 bool ChangeSearch::repeats(const FoundChange& f, const Background& b) const {
   const double from = settings_.block * double(f.from), to = settings_.block * double(f.to);
   return f.effect.width < screen_.widest() &&
@@ -156,7 +156,7 @@ std::vector<ChangeSize> ChangeSearch::fault_size(const FoundChange& f, const Bac
   const double model[] = {f.score.values.norm(), f.score.values.norm(), f.effect.width, f.effect.width};
   const auto error = [&](Eigen::Index i) {
     const double own = kShape * model[i];
-    if (whole.values.size() == 0) return model[i];  // the record does not tell place and width
+    if (whole.values.size() == 0) return model[i];  // the record does not determine place and width
     return std::sqrt(whole.covariance(i, i) * f.inflation * noisier + own * own);
   };
   const std::string unit = model::axis_unit(channel == ChangeChannel::torque ? "N m" : "rad", linear);

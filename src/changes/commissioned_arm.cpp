@@ -113,8 +113,8 @@ void CommissionedArm::read(const arm::ArmRecord& record, Changes& out) {
 /// What the arm carries loads its gears too, and a joint that stands elsewhere bears another load.
 void CommissionedArm::differ(const ChainDifference& difference, const arm::ArmRecord& record) {
   differences_.push_back(difference);
-  std::vector<std::string> told_before;
-  record_ = chain_motion(fit_, record, differences_, settings_.most_rate, told_before);
+  std::vector<std::string> reported_before;
+  record_ = chain_motion(fit_, record, differences_, settings_.most_rate, reported_before);
   for (ArmJoint& joint : joints_) {
     joint.motion = motion_by(joint.model, record_.joints[joint.index], settings_);
     set_chain_columns(record_, joint.index, joint.motion);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// An arm as its healthy records tell it, and a record by it: what the chain does not take is each joint's
+// An arm as its healthy records show it, and a record by it: what the chain does not take is each joint's
 // own.
 #pragma once
 

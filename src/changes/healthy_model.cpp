@@ -53,7 +53,7 @@ PooledFit pooled(const HealthyData& data) {
     moment += data.columns[r].transpose() * data.motions[r].target;
     fit.rows += data.motions[r].size();
   }
-  // Columns of any size; what the motion does not tell stays 0.
+  // Columns of any size; what the motion does not show stays 0.
   const Eigen::VectorXd scale = gram.diagonal().cwiseMax(1e-12 * gram.diagonal().maxCoeff()).cwiseSqrt();
   const Eigen::VectorXd inverse = scale.cwiseInverse();
   Eigen::MatrixXd scaled = inverse.asDiagonal() * gram * inverse.asDiagonal();
@@ -125,7 +125,7 @@ double squares_taken(const HealthyData& data, const std::vector<Eigen::VectorXd>
   }
   const Eigen::MatrixXd s = a - b * gram.solve(b.transpose());
   for (Eigen::Index i = 0; i < s.rows(); ++i)
-    if (!(s(i, i) > kToldApart * a(i, i))) return 0;
+    if (!(s(i, i) > kLeastOwn * a(i, i))) return 0;
   return c.dot(s.ldlt().solve(c));
 }
 
@@ -198,7 +198,7 @@ Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const C
 /// What the healthy machine leaves beside what may differ from record to record and wander within one: the
 /// noise that scores are measured by. Twice, as the first round takes the wander for noise. Of an arm, whose
 /// records are short and whose chain leaves more in another task than in those it was fitted to, all of it is
-/// noise: of the measured UR10e four of nine pairs of healthy records were told as changed otherwise.
+/// noise: of the measured UR10e four of nine pairs of healthy records were reported as changed otherwise.
 void set_noise(const PooledFit& fit, const ChangeSettings& settings, HealthyModel& model) {
   model.noise = std::sqrt(fit.squares / double(fit.rows));
   if (model.sampling.chain) {

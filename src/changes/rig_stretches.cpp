@@ -18,7 +18,7 @@ using record::Channel;
 
 constexpr std::size_t kReversals = 8;  // of a stretch. Choice: with more the errors hardly shrink
 constexpr double kTurned = 0.3;        // of the middle size, beyond which the torque is on a side. Choice
-constexpr double kContext = 2;   // of a stretch, to either side: tells where a square wave reverses. Choice
+constexpr double kContext = 2;   // of a stretch, to either side: shows where a square wave reverses. Choice
 constexpr double kUneven = 0.1;  // of an interval, error of a stamp. Choice: the fit asks for less
 constexpr double kGap = 2.5;     // intervals between samples that are none. Choice
 constexpr double kOtherLevel =
@@ -28,8 +28,9 @@ constexpr double kModelError = 0.002;  // of the swing, as in the fit: no model 
 constexpr double kMoreLeftOut =
     0.25;  // of the reversals, more than of the healthy machine. Choice: two of eight
 constexpr double kChangeSpread = 30;  // in coordinates, of a change of all values: as good as free. Choice
-constexpr double kLeastPlay = 0.1;  // of the finest backlash that can be told, or of the healthy one. Choice
-constexpr double kWide = 3;         // spread of the logarithm of the backlash: as good as free. Choice
+constexpr double kLeastPlay =
+    0.1;                     // of the finest backlash that can be estimated, or of the healthy one. Choice
+constexpr double kWide = 3;  // spread of the logarithm of the backlash: as good as free. Choice
 
 /// First sample on another side than before.
 std::vector<std::size_t> reversals_of(const std::vector<double>& torque, double level) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kThinned = 0.25;  // - of the rate that is kept, where its filter ends. Theory: below a half
 
-constexpr double kFar = 1e3;  // rad, since a reversal that was before the record
+constexpr double kLongSince = 1e3;  // rad, since a reversal that was before the record
 
 struct EvenSamples {
   std::vector<double> torque, position, deflection, chain;
@@ -119,7 +119,7 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
   return good;
 }
 
-/// Every n-th sample, after a filter that takes away what those could not tell from slower motion.
+/// Every n-th sample, after a filter that takes away what they would show as slower motion.
 void thin(std::vector<double>& values, std::size_t n, double interval) {
   const std::vector<double> slow = signal::low_pass(values, interval, kThinned / (double(n) * interval));
   values.clear();
@@ -162,7 +162,7 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
       squares_about(jerk, static_cast<std::size_t>(std::lround(settings.rough / dt)));
   const std::vector<double> parting =
       signal::derivative(signal::derivative(filtered(even.deflection), dt), dt);
-  double way = kFar;
+  double way = kLongSince;
   for (std::size_t k = 0; k < position.size(); ++k) {
     if (k > 0) way = speed[k] * speed[k - 1] < 0 ? 0 : way + std::fabs(position[k] - position[k - 1]);
     Moment m = {double(k) * dt,
