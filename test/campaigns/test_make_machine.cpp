@@ -314,7 +314,7 @@ TEST_F(MakeMachine, TeethAreAsTheTruthSays) {
   }
   ASSERT_GT(residual.size(), 1000u);
   // The load encoder's steps, as an angle and as the torque that follows from them. The median, for a
-  // low-passed torque does not tell every bounce; half more, as the steps are not quite white. The
+  // low-passed torque does not show every bounce; half more, as the steps are not quite white. The
   // transmission error is 4e-5 rad and more.
   const double steps = 7e-6 / std::sqrt(12.0);
   const double noise =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is told of looks whose findings the test writes down.
+// What is reported of looks whose findings the test writes down.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -37,7 +37,7 @@ ChangeLook look(double to, std::vector<FoundChange> changes, std::vector<std::st
   return l;
 }
 
-TEST(ChangeLedger, TellsAChangeOnceAndWhenASecondLookFindsIt) {
+TEST(ChangeLedger, ReportsAChangeOnceAndWhenASecondLookFindsIt) {
   ChangeLedger ledger;
   EXPECT_TRUE(ledger.take(look(1000, {coulomb(950, 0.6)})).empty());
   EXPECT_TRUE(ledger.reported().empty());
@@ -51,7 +51,7 @@ TEST(ChangeLedger, TellsAChangeOnceAndWhenASecondLookFindsIt) {
   EXPECT_TRUE(ledger.unexplained_difference().empty());
 }
 
-TEST(ChangeLedger, TellsWhatBecomesSharper) {
+TEST(ChangeLedger, ReportsWhatBecomesSharper) {
   ChangeLedger ledger;
   ledger.take(look(1000, {coulomb(950, 0.6, 0.05)}));
   ledger.take(look(1060, {coulomb(950, 0.6, 0.05)}));
@@ -105,7 +105,7 @@ TEST(ChangeLedger, EndsAChangeThatIsUndone) {
 }
 
 // One look sees onset and end; later ones, from which the onset has gone, see the end as a change.
-TEST(ChangeLedger, TheEndThatWasToldIsNoFurtherChange) {
+TEST(ChangeLedger, TheEndThatWasReportedIsNoFurtherChange) {
   ChangeLedger ledger;
   FoundChange ended = coulomb(950, 0.6);
   ended.until = kStart + 1030;

@@ -401,7 +401,7 @@ TEST_F(HistoryTest, BehindALinkTheFileItselfIsRotated) {
   EXPECT_EQ(read_history(path("real/elbow.csv")).entries.size(), 4u);
 }
 
-/// Appends entries from `first` on, telling each number once append has returned, until it is killed.
+/// Appends entries from `first` on, sending each number once append has returned, until it is killed.
 [[noreturn]] void write_on(const std::string& path, int first, int pipe) {
   try {
     History history({path, 2000});
@@ -417,7 +417,7 @@ TEST_F(HistoryTest, BehindALinkTheFileItselfIsRotated) {
 TEST_F(HistoryTest, NoKillCostsAnEntryThatWasWritten) {
   Random random(7);
   int next = 0;
-  std::vector<int> told;
+  std::vector<int> appended;
   for (int round = 0; round < 40; ++round) {
     int ends[2];
     ASSERT_EQ(::pipe(ends), 0);
@@ -429,7 +429,7 @@ TEST_F(HistoryTest, NoKillCostsAnEntryThatWasWritten) {
     int number = 0;
     for (int i = 0; i < until; ++i) {
       ASSERT_EQ(::read(ends[0], &number, sizeof number), static_cast<ssize_t>(sizeof number));
-      told.push_back(number);
+      appended.push_back(number);
     }
     ::usleep(random.below(3000));
     ::kill(child, SIGKILL);
@@ -437,10 +437,10 @@ TEST_F(HistoryTest, NoKillCostsAnEntryThatWasWritten) {
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     ASSERT_TRUE(WIFSIGNALED(status)) << WEXITSTATUS(status);
     while (::read(ends[0], &number, sizeof number) == static_cast<ssize_t>(sizeof number))
-      told.push_back(number);
+      appended.push_back(number);
     ::close(ends[0]);
     // The entry under way when it died may be there or not; its number is not used again.
-    next = told.empty() ? next + 1 : std::max(next, told.back() + 2);
+    next = appended.empty() ? next + 1 : std::max(next, appended.back() + 2);
   }
   history();
   std::vector<int> found;
@@ -448,10 +448,10 @@ TEST_F(HistoryTest, NoKillCostsAnEntryThatWasWritten) {
     found.push_back(static_cast<int>(std::lround((e.time - 1.8e9) / 0.1)));
     expect_same(e, entry(found.back()));
   }
-  EXPECT_GT(told.size(), 200u);
+  EXPECT_GT(appended.size(), 200u);
   EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
-  EXPECT_TRUE(std::includes(found.begin(), found.end(), told.begin(), told.end()));
-  EXPECT_LE(found.size(), told.size() + 40);
+  EXPECT_TRUE(std::includes(found.begin(), found.end(), appended.begin(), appended.end()));
+  EXPECT_LE(found.size(), appended.size() + 40);
 }
 
 }  // namespace

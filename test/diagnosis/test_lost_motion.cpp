@@ -530,7 +530,7 @@ TEST(LostMotionMeasured, RigWithKnownHalfGapWithinThreeMicrometres) {
     EXPECT_NEAR(estimate.backlash, truth, 3e-6) << estimate.message;  // demanded of the method
     EXPECT_LE(estimate.lower, truth);
     EXPECT_GE(estimate.upper, truth);
-    EXPECT_LT(estimate.upper - estimate.lower, 1e-5);  // an interval that still tells 25 um steps apart
+    EXPECT_LT(estimate.upper - estimate.lower, 1e-5);  // an interval that still separates steps of 25 um
   }
 }
 

@@ -84,7 +84,7 @@ TEST(Verdict, IntervalsThatJustMissEachOtherWidenTheAnswer) {
   EXPECT_EQ(combined({ok("a", 8e-5, 2e-6), ok("b", 8.9e-5, 2e-6)}).grade, Grade::cannot_tell);
 }
 
-// Told by who is believed, also where the play is too small to be told; not by who is contradicted.
+// Reported by who is believed, also where the play is too small to be reported; not by who is contradicted.
 // 9e-5 +- 3e-5 over the travel, and 8e-5 +- 2e-6 where another looked.
 TEST(Verdict, HoldsWhatOneSawAndOthersDidNotLookFor) {
   Estimate wide = ok("a", 9e-5, 3e-5);
@@ -320,7 +320,7 @@ TEST(Verdict, ALowerBoundBesideASoundEstimate) {
   EXPECT_EQ(v.grade, Grade::stop);
 }
 
-TEST(Verdict, NothingSoundCannotTellAndSaysWhy) {
+TEST(Verdict, NothingSoundIsNoAnswerAndSaysWhy) {
   const Verdict v = combined(
       {unable("a", Status::ambiguous, "flat"), unable("b", Status::below_range, "high"),
        unable("c", Status::insufficient_data, "no channel"), unable("d", Status::above_range, "low")});

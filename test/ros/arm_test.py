@@ -142,7 +142,7 @@ class ArmTest(unittest.TestCase):
         self.assertGreaterEqual(change.since_to, before)
         self.assertLess(change.error_after, change.error_before)
 
-    def test_live_is_as_offline_and_a_recorded_bag_tells_both_plays(self):
+    def test_live_is_as_offline_and_a_recorded_bag_gives_both_plays(self):
         bag, offline = (os.path.join(self.folder, name) for name in ("live.bag", "offline.bag"))
         parameters = {"rig": RIG, "seed": 5, "duration": 20.0, "real_time_factor": 4.0, "publish_clock": False,
                       "wait_for_subscriber": True, "set_robot_description": False}

@@ -445,7 +445,7 @@ TEST_F(BagRecord, ReadsARobotsOwnNamesAndTopics) {
   }
 }
 
-TEST_F(BagRecord, AMapThatIsWrongIsToldWhatThereIs) {
+TEST_F(BagRecord, AWrongMapIsRefusedWithWhatThereIs) {
   record_robot(file("robot.bag"));
   const auto refusal = [&](const record::ChannelMap& map) {
     return message_of<BadData>([&] { read_bag(file("robot.bag"), map); });

@@ -219,9 +219,9 @@ TEST(RigEstimators, MomentumTransferNeedsToSeeTheImpacts) {
             diagnosis::Status::below_range);
 }
 
-// Friction of 44 to 73 N m that the settings do not know: what leaves nothing in flight tells it, or there is
-// no answer. Plays of truth.json, rad. Of the slow motions, "train", teeth that yield after Hertz would
-// explain all of the travel.
+// Friction of 44 to 73 N m that the settings do not know: what leaves nothing in flight determines it, or
+// there is no answer. Plays of truth.json, rad. Of the slow motions, "train", teeth that yield after Hertz
+// would explain all of the travel.
 TEST(RigEstimators, MomentumTransferOfServosWithUndeclaredFriction) {
   int seen = 0, answered = 0;
   for (const auto& [name, play] : {std::pair{"dev1", 5.742e-4}, {"dev3", 6.020e-4}, {"dev6", 8.633e-4}})

@@ -385,7 +385,7 @@ TEST_F(Commands, CurveIsBuiltWhereNoneIsGiven) {
   EXPECT_EQ(run("diagnose_record a.csv --rig fast.yaml --method lost_motion --json -").err, "");
 }
 
-TEST_F(Commands, StaleCurveIsTold) {
+TEST_F(Commands, StaleCurveIsReported) {
   write("noisy.yaml", rig_variant(true, false));
   done("simulate rig.yaml --duration 0.5 --out a.csv");
   done("build_curve noisy.yaml --points 2 --seeds 1 --periods 1 --out c.yaml");
@@ -407,7 +407,7 @@ TEST_F(Commands, PeriodsKeepsTheLastOnes) {
   expect_contains(more["warnings"].dump(), "shorter");
 }
 
-TEST_F(Commands, RepeatedStampsAreTold) {
+TEST_F(Commands, RepeatedStampsAreReported) {
   write("a.csv", "time,motor_torque\n0,1\n0.1,2\n0.1,3\n0.2,1\n");
   expect_contains(run("convert_record a.csv a.bag").err, "repeated time stamp");
   expect_contains(report("a.csv", 3)["warnings"].dump(), "repeated time stamp");
