@@ -22,12 +22,12 @@ const char* unit_of_gap(const diagnosis::WaveformSettings& machine) {
 double torque_in_doubt(const diagnosis::WaveformSettings& declared,
                        const diagnosis::WaveformCommissioning& found) {
   const double off = std::abs(std::log(found.machine.sensor_gain / declared.sensor_gain));
-  const bool told = off > kGainSpreads * declared.spread.sensor_gain &&
-                    off > kGainErrors * found.machine.spread.sensor_gain;
-  return told ? off : 0;
+  const bool clear = off > kGainSpreads * declared.spread.sensor_gain &&
+                     off > kGainErrors * found.machine.spread.sensor_gain;
+  return clear ? off : 0;
 }
 
-/// Of what is told by a torque over a motion.
+/// Of what a torque over a motion determines.
 bool is_torque(const std::string& unit) {
   return unit.find('N') != std::string::npos || unit.find("kg") != std::string::npos;
 }
@@ -57,13 +57,13 @@ void warn(Identification& result, const diagnosis::WaveformCommissioning& found,
         "hold",
         found.machine.sensor_gain, 100 * doubt));
   if (!found.untold.empty())
-    result.warnings.push_back("the records do not tell " + joined(found.untold) +
+    result.warnings.push_back("the records do not determine " + joined(found.untold) +
                               ": what the rig file says of it is kept");
   for (const diagnosis::WaveformCommissioning::State& state : found.states)
     if (!state.position) {
       result.warnings.push_back(fmt::format(
-          "torque alone does not tell the scale of inertias, stiffnesses and play: all are known to "
-          "{:.2g} % together; a record with motor_position or a backlash told with its uncertainty "
+          "torque alone does not give the scale of inertias, stiffnesses and play: all are known to "
+          "{:.2g} % together; a record with motor_position or a backlash declared with its uncertainty "
           "sharpens it",
           100 * found.machine.common_scale));
       break;
@@ -73,12 +73,12 @@ void warn(Identification& result, const diagnosis::WaveformCommissioning& found,
 }  // namespace
 
 Identification commission(const rig_file::RigFile& file, const std::vector<record::Record>& records) {
-  const bool told = file.backlash_error.has_value();
+  const bool known = file.backlash_error.has_value();
   Identification result;
   result.rig = file.rig;
   result.commissioning =
-      diagnosis::commission_waveform(records, *file.diagnosis.waveform, told ? file.rig.mesh.backlash : kNaN,
-                                     told ? *file.backlash_error : kNaN);
+      diagnosis::commission_waveform(records, *file.diagnosis.waveform, known ? file.rig.mesh.backlash : kNaN,
+                                     known ? *file.backlash_error : kNaN);
   const diagnosis::WaveformCommissioning& found = *result.commissioning;
   ProcedureReport report{"waveform", {}, ""};
   static const char* const kNames[] = {"torque", "position"};

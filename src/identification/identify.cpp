@@ -85,7 +85,7 @@ std::vector<Procedure> procedures_for(const model::Rig& rig) {
 void put_skew_back(IdentificationCase& c) {
   const std::string& name =
       rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew).name;
-  if (c.skew.standard_error == 0) return;  // no record tells it
+  if (c.skew.standard_error == 0) return;  // no record determines it
   c.result.rig.encoder_skew += c.skew.value;
   const auto fitted = c.result.parameters.find(name);
   if (fitted == c.result.parameters.end())
@@ -170,7 +170,7 @@ void warn_of_misfit(Identification& result) {
   const double build_up = result.one_inertia ? kBuildUp : 0;
   for (const auto& [name, channel] : result.channels)
     if (left_beyond_noise(channel) <= kMostLeft &&
-        channel.error > std::max(kMisfit * channel.floor, std::hypot(channel.floor, build_up)))
+        channel.error > std::max(kShowsMissingEffect * channel.floor, std::hypot(channel.floor, build_up)))
       result.warnings.push_back(
           fmt::format("{}: the fitted model leaves {} where noise alone would leave {}: the machine has an "
                       "effect that the "

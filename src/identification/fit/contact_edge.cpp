@@ -53,8 +53,8 @@ Eigen::VectorXd shift_of_contact_edge(const MachineFit& fit, const RecordSet& re
   const auto rows = scaled.topRows(now.size());
   const Eigen::VectorXd moved = -signal::solve_symmetric(signal::gram(scaled), rows.transpose() * change);
   const Eigen::VectorXd own = change + rows * moved;
-  const double told = own.dot(now) / own.norm() / (now.norm() / std::sqrt(double(now.size())));
-  if (!(std::fabs(told) > kClear)) return Eigen::VectorXd::Zero(moved.size());
+  const double in_errors = own.dot(now) / own.norm() / (now.norm() / std::sqrt(double(now.size())));
+  if (!(std::fabs(in_errors) > kClear)) return Eigen::VectorXd::Zero(moved.size());
   return unit.cwiseProduct(moved) * (-own.dot(now) / own.squaredNorm());
 }
 

@@ -13,7 +13,8 @@ namespace backlash::identification {
 /// and c be what that changes of the residuals r. This gives by how much the fitted values move with as much
 /// of it as the records bear out,
 ///   s = -(J' J)^-1 J' c a,   a = -(c* . r) / (c* . c*)     c* the part of c that no value explains
-/// 0 where a is not told from chance, the teeth have no such damper or there is no load of its own.
+/// 0 where a does not differ clearly from chance, the teeth have no such damper or there is no load of its
+/// own.
 Eigen::VectorXd shift_of_contact_edge(const MachineFit& fit, const RecordSet& records);
 
 }  // namespace backlash::identification

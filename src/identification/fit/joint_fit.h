@@ -103,7 +103,7 @@ class Unknowns {
   /// Throws InvalidParameter for what is refused by the rig.
   model::Rig rig(const Eigen::VectorXd& values) const;
   std::vector<Calibration> calibrations(const Eigen::VectorXd& values) const;
-  /// One row per value: a wide prior about its start, so that what the records do not tell stays there.
+  /// One row per value: a wide prior about its start, so that what the records do not determine stays there.
   Eigen::VectorXd prior(const Eigen::VectorXd& values) const;
   Machine machine(const Eigen::VectorXd& values) const;
   std::map<std::string, signal::Measured> parameters(const MachineFit& fit) const;
@@ -127,10 +127,10 @@ MachineFit fit_machine(const Machine& start, const RecordSet& records, signal::N
 /// error. Of a machine that is coupled to other axes also what is left counts as if it followed each value.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
-/// An effect that the model lacks (kMisfit) may follow what a value changes, and draws it without a trace: no
-/// value is told better than by what would change the records as much as all that is left of such channels,
-/// or, with all others fitted, as three tenths of it. Nothing is done to a machine that is coupled:
-/// judge_errors() has allowed for it.
+/// An effect that the model lacks (kShowsMissingEffect) may follow what a value changes, and draws it without
+/// a trace: no value is known better than by what would change the records as much as all that is left of
+/// such channels, or, with all others fitted, as three tenths of it. Nothing is done to a machine that is
+/// coupled: judge_errors() has allowed for it.
 void allow_for_misfit(MachineFit& fit, const RecordSet& records);
 
 }  // namespace backlash::identification

@@ -278,7 +278,7 @@ std::vector<double> PreparedServo::acting_torque(const model::Rig& rig,
 /// Of a machine whose torque holds the coupling of other axes. That torque, less what the motor takes, goes
 /// through the teeth all the same:
 ///   q_L = q_M - e(tau - J_M a_M - friction)
-/// so that the load's position follows, and the torque itself cannot be told.
+/// so that the load's position follows, and the torque itself cannot be predicted.
 ServoResiduals PreparedServo::coupled_residuals(const model::Rig& rig, const Calibration& calibration) const {
   const ServoData& d = data();
   const model::GearTrain train(rig);

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/procedures/flank_fit.h"
+#include "backlash_diagnosis/identification/procedures/clearance_flanks.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
@@ -24,7 +24,7 @@ constexpr double kOutlier = 3;        // choice: of the median deviation
 constexpr int kPushes[] = {2, 3};     // choice: degrees of the push over J
 constexpr double kSlow = 0.2;         // choice: of the fastest: below it friction changes
 constexpr double kSensitive = 0.05;   // choice: of the gap, between the two pushes: worth a warning
-constexpr double kUncertain = 0.25;   // choice: of the gap: beyond it is not told
+constexpr double kUncertain = 0.25;   // choice: of the gap: beyond which none is reported
 constexpr double kFlanks = 1.3;       // simulation: by which flanks must better the fit
 constexpr int kLeastSamples = 20;     // choice: of a passage
 
@@ -250,10 +250,10 @@ Clearance identify_clearance(const record::Record& record, const ClearanceSettin
                     by_push[1].fit.without_flanks, by_push[1].fit.deviation));
   c.gap = {0.5 * (gaps[0].value + gaps[1].value), std::hypot(noise, difference)};
   if (c.gap.standard_error > kUncertain * c.gap.value)
-    throw CannotIdentify(
-        fmt::format("the passages do not tell flank from push: {:.4g} rad with a parabola, {:.4g} rad with a "
-                    "cubic, error {:.4g} rad",
-                    gaps[0].value, gaps[1].value, noise));
+    throw CannotIdentify(fmt::format(
+        "the passages do not distinguish flank from push: {:.4g} rad with a parabola, {:.4g} rad with a "
+        "cubic, error {:.4g} rad",
+        gaps[0].value, gaps[1].value, noise));
   const Passages& p = by_push[1];
   c.passages = p.measured;
   c.lower = p.fit.flanks.lower;

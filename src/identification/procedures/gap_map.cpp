@@ -90,8 +90,8 @@ std::vector<std::pair<double, double>> averaged(const Run& run, double width) {
   return means;
 }
 
-/// Slope of motor over load position. Over a turn and more the centre line repeats and is told from the slope
-/// by its first orders; over less they are one.
+/// Slope of motor over load position. Over a turn and more the centre line repeats and is separated from the
+/// slope by its first orders; over less they are one.
 void measure_scale(Run& run, double width) {
   const auto means = averaged(run, width);
   const double travel = means.back().first - means.front().first;

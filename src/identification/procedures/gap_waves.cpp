@@ -31,7 +31,7 @@ constexpr int kSides = 2;              // choice: n, to either side
 constexpr double kPerLine = 3;         // theory: trial orders per line of the spectrum, 1 / turns
 constexpr double kSame = 3;            // theory: standard errors
 constexpr double kScale = 1e-3;        // choice: of the order, as far as an encoder's scale may be off
-constexpr double kBeside = 1e-6;       // choice: share of a wave beside the whole orders, to tell it by
+constexpr double kBeside = 1e-6;       // choice: share of a wave beside the whole orders, to know it by
 constexpr double kWhole = 0.02;        // choice: orders so near a whole one are the load's
 
 using Eigen::Index;
@@ -161,16 +161,16 @@ MatrixXd columns(const Cells& cells, const MatrixXd& base, const std::vector<Tri
   return a;
 }
 
-/// P(F > f); 1 where there is nothing to tell it by.
+/// P(F > f); 1 where there is too little to judge by.
 double f_tail(double f, double of_wave, double freedom) {
   if (!(f > 0) || !(freedom > 2)) return 1;
   return cdf(complement(boost::math::fisher_f(of_wave, freedom), std::min(f, 1e100)));
 }
 
 /// What is left of the values beside some columns, and by how much less a further order leaves.
-class Left {
+class RestBeside {
  public:
-  Left(const Cells& cells, const MatrixXd& a) : cells_(cells) {
+  RestBeside(const Cells& cells, const MatrixXd& a) : cells_(cells) {
     q_ = signal::orthonormal_basis(a);
     left_ = beside(cells.value);
     correlation_ = signal::correlation_length({left_.begin(), left_.end()});
@@ -234,42 +234,42 @@ class Search {
         settings_(settings),
         base_(base_columns(cells, whole_orders(settings))),
         per_(columns_per_wave(cells)),
-        told_(orders_of(settings.drive, settings.highest_order)) {}
+        declared_(orders_of(settings.drive, settings.highest_order)) {}
 
   /// Orders that the two runs do not show alike.
   const std::vector<double>& doubtful() const { return doubtful_; }
 
   std::vector<GapWave> run() {
-    while (waves_.size() < kMostWaves && (add(told()) || add(free()))) {
+    while (waves_.size() < kMostWaves && (add(declared()) || add(free()))) {
     }
     return found();
   }
 
  private:
-  Left left(const std::vector<Trial>& waves) const { return {cells_, columns(cells_, base_, waves)}; }
+  RestBeside left(const std::vector<Trial>& waves) const { return {cells_, columns(cells_, base_, waves)}; }
 
-  /// By a wave that the runs cannot tell from this order.
+  /// By a wave that the runs cannot distinguish from this order.
   bool taken(double order) const {
     return std::any_of(waves_.begin(), waves_.end(),
                        [&](const Trial& w) { return std::fabs(w.order - order) < 0.5 / turns_; });
   }
 
   /// The best of the drive's orders that are left.
-  std::optional<Trial> told() const {
-    const Left rest = left(waves_);
+  std::optional<Trial> declared() const {
+    const RestBeside rest = left(waves_);
     std::optional<Trial> best;
     double most = 0;
-    for (const Trial& t : told_) {
+    for (const Trial& t : declared_) {
       const double gain = taken(t.order) ? 0 : rest.gain(t.order);
       if (gain > most) most = gain, best = t;
     }
-    if (best) best->chance = rest.chance(most, double(told_.size()));
+    if (best) best->chance = rest.chance(most, double(declared_.size()));
     return best;
   }
 
   /// The best of all orders, whole ones of the load left out.
   std::optional<Trial> free() const {
-    const Left rest = left(waves_);
+    const RestBeside rest = left(waves_);
     const double step = 1 / (kPerLine * turns_);
     double best = 0, most = 0;
     for (double order = 1; order <= settings_.highest_order; order += step) {
@@ -288,7 +288,7 @@ class Search {
     if (!trial || trial->chance > settings_.false_alarm) return false;
     waves_.push_back(*trial);
     try {
-      if (!trial->free) doubt_told();
+      if (!trial->free) doubt_declared();
       const signal::Measured order = found_in(fitted(), waves_.size() - 1).order;
       // A free order that may be a whole one is the load's: the map over its turn has it.
       const double off = std::fabs(order.value - std::round(order.value));
@@ -300,12 +300,13 @@ class Search {
   }
 
   /// Whether the record says that the last wave, of the drive, has another order: then that, without a name.
-  void doubt_told() {
-    const Trial told = waves_.back();
+  void doubt_declared() {
+    const Trial named = waves_.back();
     waves_.back().free = true;
     const signal::Measured order = found_in(fitted(), waves_.size() - 1).order;
-    if (!(std::fabs(order.value - told.order) > std::max(kSame * order.standard_error, kScale * told.order)))
-      waves_.back() = told;
+    if (!(std::fabs(order.value - named.order) >
+          std::max(kSame * order.standard_error, kScale * named.order)))
+      waves_.back() = named;
     else
       waves_.back().pinion = waves_.back().load = 0;
   }
@@ -404,12 +405,12 @@ class Search {
   GapWaveSettings settings_;
   MatrixXd base_;
   Index per_;
-  std::vector<Trial> told_, waves_;
+  std::vector<Trial> declared_, waves_;
   double correlation_ = 1;  // of the last fit
   std::vector<double> doubtful_;
 };
 
-/// Of the load, until the same teeth of the last stage meet again; 0: not told.
+/// Of the load, until the same teeth of the last stage meet again; 0: not declared.
 double turns_to_meet(const rig_file::Drive* drive) {
   if (!drive || drive->stages.empty()) return 0;
   const rig_file::Drive::Stage& last = drive->stages.back();
@@ -435,9 +436,9 @@ GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapW
   Cells cells = shared_cells(forward, reverse, width);
   if (cells.turns < kLeastTurns) cells = separate_cells(forward, reverse, width);
   result.turns = cells.turns;
-  const bool told = result.turns_to_meet > 0;
+  const bool pinion = result.turns_to_meet > 0;
   if (result.turns < kLeastTurns) {
-    if (told)
+    if (pinion)
       result.warnings.push_back(fmt::format(
           "the runs cover {:.3g} turns of the load: what of the gap turns with the pinion needs more "
           "than {:.3g}",
@@ -449,9 +450,9 @@ GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapW
   for (const double order : search.doubtful())
     result.warnings.push_back(fmt::format(
         "order {:.4g} turns with another part than the load; whether with the gap or the centre line "
-        "alone the runs cannot tell, as they share no place",
+        "alone is unknown, as the runs share no place",
         order));
-  if (told && result.turns_to_meet > result.turns + 0.05)
+  if (pinion && result.turns_to_meet > result.turns + 0.05)
     result.warnings.push_back(fmt::format(
         "the same teeth meet again after {:.4g} turns of the load, the runs share {:.3g}: the map "
         "over both gears holds there, beyond it as a series",

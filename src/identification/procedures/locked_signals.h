@@ -66,7 +66,7 @@ class LockedSignals {
   Eigen::MatrixXd picked(const Eigen::MatrixXd& values) const;
 
  private:
-  /// Samples over which the speed is smooth (servo_data.h): before and after a stop it tells no direction.
+  /// Samples over which the speed is smooth (servo_data.h): before and after a stop it shows no direction.
   long reach() const;
   std::vector<double> raw_mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const;
   Eigen::VectorXd low_passed(std::vector<double> values) const;

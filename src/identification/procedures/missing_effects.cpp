@@ -9,7 +9,8 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kTold = 0.1;         // choice: share of the squares that are left, that an effect explains
+constexpr double kLeastExplained =
+    0.1;                              // choice: share of the squares that are left, that an effect explains
 constexpr double kComparable = 2;     // choice: times the squares that the best effect leaves
 constexpr int kMostEffects = 4;       // choice: in one machine
 constexpr double kDrawn = 0.1;        // simulation: share of what is left that follows a column
@@ -108,7 +109,7 @@ Eigen::VectorXd drawn_by_missing(const Eigen::MatrixXd& a, const Eigen::VectorXd
       tried.push_back(extended(a, beside(chosen, effect), residuals));
     const auto best = std::min_element(tried.begin(), tried.end(),
                                        [](const Extended& x, const Extended& y) { return x.left < y.left; });
-    if (best == tried.end() || with.left - best->left < kTold * with.left) break;
+    if (best == tried.end() || with.left - best->left < kLeastExplained * with.left) break;
     Eigen::VectorXd furthest = Eigen::VectorXd::Zero(a.cols());
     for (const Extended& e : tried)
       if (e.left <= kComparable * best->left)

@@ -199,7 +199,7 @@ void require_both_directions(const std::string& name, const Signals& s) {
   if (s.used.size() < 64 || std::min(forward, backward) < kLeastShare * double(s.time.size()))
     throw CannotIdentify(fmt::format(
         "{}: moves for certain, beyond the noise of its speed, forward in {:.3g} % and backward in "
-        "{:.3g} % of the samples: Coulomb friction and offset cannot be told apart",
+        "{:.3g} % of the samples: Coulomb friction and offset cannot be distinguished: move both ways",
         name, 100 * forward / double(s.time.size()), 100 * backward / double(s.time.size())));
 }
 
@@ -342,7 +342,7 @@ Read read_band(const record::EvenGrid& grid, double cutoff, const OneInertiaOpti
   if (std::fabs(read.solution.delay) <= largest - 0.01 && error <= std::max(kVagueDelay, 0.25 * largest))
     return read;
   read.warnings.push_back(
-      fmt::format("the delay between torque and position cannot be told ({:.3g} +- {:.3g} samples, "
+      fmt::format("the delay between torque and position is not determined ({:.3g} +- {:.3g} samples, "
                   "searched within {:.3g}): taken as 0",
                   read.solution.delay, error, largest));
   read.solution = solve(s, a, 0, false);
@@ -397,7 +397,7 @@ OneInertia identify_one_inertia(const record::Record& recorded, const OneInertia
   const Eigen::VectorXd predicted = a * fit.values, measured = predicted + fit.residuals;
   out.relative_error = std::sqrt(fit.residuals.squaredNorm() / double(measured.size())) / spread(measured);
   out.floor = floor_of(record, s, fit.values[0], spread(measured));
-  if (out.relative_error > kMisfit * out.floor)
+  if (out.relative_error > kShowsMissingEffect * out.floor)
     allow_for_missing(solution, s, a, record, out.floor * spread(measured) * std::sqrt(double(a.rows())));
   const std::vector<signal::Measured OneInertia::*> names = fitted_members(options.gravity);
   for (std::size_t i = 0; i < names.size(); ++i)
@@ -439,8 +439,9 @@ OneInertia applied(const OneInertia& machine, const record::Record& recorded, co
 OneInertia combined(const std::vector<OneInertia>& machines) {
   OneInertia all = machines.front();
   if (machines.size() == 1) return all;  // whatever its errors, which may be 0 without any noise
-  const bool drawn = std::any_of(machines.begin(), machines.end(),
-                                 [](const OneInertia& m) { return m.relative_error > kMisfit * m.floor; });
+  const bool drawn = std::any_of(machines.begin(), machines.end(), [](const OneInertia& m) {
+    return m.relative_error > kShowsMissingEffect * m.floor;
+  });
   for (signal::Measured OneInertia::*parameter : fitted_members(all.gravity)) {
     std::vector<signal::Measured> values;
     double least = std::numeric_limits<double>::infinity();
