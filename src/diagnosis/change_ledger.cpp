@@ -14,7 +14,7 @@ constexpr double kSameEvent = 5;  // s between onsets of what is one change. As 
 constexpr double kEdge = 30;      // s at either end of a stretch in which a look may miss one. Choice: three
                                   // times the margin of the search, and what an onset is uncertain by
 constexpr int kMostMissed = 3;    // looks in a row, then a change is withdrawn, or no longer seen. Choice
-constexpr double kSharper = 0.9;  // - of an interval that is worth telling. Choice
+constexpr double kSharper = 0.9;  // - of an interval that is worth a report. Choice
 constexpr double kUndone = 3;     // standard errors within which a size is undone. Choice
 
 const std::pair<ChangeState, const char*> kStates[] = {{ChangeState::suspected, "suspected"},
@@ -235,8 +235,8 @@ void ChangeLedger::restart() {
   different_looks_ = 0;
 }
 
-void ChangeLedger::restore(const std::vector<KnownChange>& told) {
-  for (const KnownChange& k : told) {
+void ChangeLedger::restore(const std::vector<KnownChange>& reported) {
+  for (const KnownChange& k : reported) {
     known_.push_back(k);
     known_.back().key = ++last_key_;
     last_id_ = std::max(last_id_, k.id);

@@ -33,17 +33,17 @@ constexpr double kSwings = 0.05;           // of the windows, that change flanks
 constexpr int kIterations = 40;
 constexpr std::size_t kFewest = 12;        // windows per flank
 constexpr std::size_t kFewestAgainst = 3;  // stays against the motion, choice: two may be one mistake
-// Share of the windows against the motion, and with it: of 0.1 to 3 % that touches and stops leave the play
-// was told wrong, of motions that tell it 5 % and more are. Simulation.
+// Share of the windows against the motion, and with it. Motions whose windows were 0.1 to 3 % (touches and
+// stops only) gave a wrong play; motions that show it have 5 % and more. Simulation.
 constexpr double kShareAgainst = 0.04;
 // Of the windows, on either flank: with less, one flank is read where the other never is, and teeth of which
-// one side is stiffer look like play. Of records that told a wrong one 2 to 9 %, of 278 others one less than
-// 14 %.
+// one side is stiffer look like play. Records that gave a wrong play had 2 to 9 %; of 278 others one had less
+// than 14 %.
 constexpr double kShareOfFlank = 0.1;
-// Of the squares of side, what f, the torque and the motion leave: where they tell the side, as in moves to
-// and fro over the same path, each flank pressed in its own part of it, they take the play as well. Of 150
-// such records those with less than 1e-4 told a third to two thirds of the play, the others had more than
-// 4e-3.
+// Of the squares of side, what f, the torque and the motion leave: where these determine the side, as in
+// moves to and fro over the same path, each flank pressed in its own part of it, they take the play as well.
+// Of 150 such records those with less than 1e-4 gave a third to two thirds of the play, the others had more
+// than 4e-3.
 constexpr double kOwnShare = 3e-3;
 
 double scaled(double n, double count) {
@@ -418,15 +418,15 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
   const double left = 1 - noise * inverse_(elastic_at_, elastic_at_);
   fit.attenuation = left > 0 ? noise * p_[elastic_at_] * row[elastic_at_] / left : INFINITY;
   const auto fewer = double(std::min(fit.used[0], fit.used[1]));
-  fit.lack = [&] {
+  fit.obstacle = [&] {
     if (fewer < std::max(double(kFewest), model_.moving ? kShareOfFlank * count : 0))
-      return FlanksLack::pressed;
-    if (fit.against < kFewestAgainst) return FlanksLack::both_directions;
-    if (model_.moving && share_that_swings() > kSwings) return FlanksLack::whole_windows;
-    if (model_.moving && gap.cols() == 1 && kOwnShare * alone >= 1) return FlanksLack::own_part;
-    return FlanksLack::nothing;
+      return FlankObstacle::not_pressed;
+    if (fit.against < kFewestAgainst) return FlankObstacle::one_direction;
+    if (model_.moving && share_that_swings() > kSwings) return FlankObstacle::chatter;
+    if (model_.moving && gap.cols() == 1 && kOwnShare * alone >= 1) return FlankObstacle::own_part;
+    return FlankObstacle::none;
   }();
-  fit.found = fit.lack == FlanksLack::nothing;
+  fit.found = fit.obstacle == FlankObstacle::none;
   return fit;
 }
 
@@ -454,7 +454,7 @@ FlankFit Fitter::fit() {
     solve(MatrixXd::Ones(n_, 1), deviation);
     fit = result(MatrixXd::Ones(n_, 1));
     if (fit.residual > kVaries * varying.residual) {
-      varying.found = fit.found, varying.lack = fit.lack;
+      varying.found = fit.found, varying.obstacle = fit.obstacle;
       fit = varying;
       fit.varies = true;
       fit.least_gap = knots.minCoeff();

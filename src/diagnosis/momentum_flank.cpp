@@ -250,9 +250,10 @@ Flank calm_flank(const Motor& motor, const MomentumTransferSettings& s) {
                              motion * noise_gain(false, motor.tachometer, dt, flank.half, s));
     if (kNoiseFree * flank.noise < 0.5 * flank.level) return flank;
   }
-  throw Refusal{Status::out_of_domain, fmt::format("impacts cannot be told from noise: the torque on the "
-                                                   "flank, {:.4g} N m in the median, has noise of {:.4g} N m",
-                                                   flank.level, flank.noise)};
+  throw Refusal{Status::out_of_domain,
+                fmt::format("impacts cannot be distinguished from noise: the torque on the "
+                            "flank, {:.4g} N m in the median, has noise of {:.4g} N m",
+                            flank.level, flank.noise)};
 }
 
 }  // namespace backlash::diagnosis::momentum

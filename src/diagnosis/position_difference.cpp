@@ -43,9 +43,10 @@ constexpr double kLargeTorque = 0.95;  // quantile, where laws of the deflection
 constexpr double kWorthSaying = 0.25;
 constexpr double kLargestScaleError = 0.01;
 // Of the compliance against the declared one. Where the torque has two values only, as with a slow square
-// wave, nothing but the noise of the acceleration tells compliance from play, and draws the former towards 0.
+// wave, nothing but the noise of the acceleration distinguishes compliance from play, and draws the former
+// towards 0.
 constexpr double kLargestFactor = 2;
-// Parts of a record with a moving load tell the same play: to within a share of it, their errors, and what
+// Parts of a record with a moving load give the same play: to within a share of it, their errors, and what
 // the shape of the deflection leaves. Choices, tried on plays that grow within the record.
 constexpr std::size_t kMostParts = 16, kFewestWindows = 32;  // of a part, at least
 constexpr double kPartChange = 0.1, kPartErrors = 4, kPartResiduals = 2;
@@ -70,7 +71,7 @@ void check(const PositionDifferenceSettings& s) {
   require(!(s.base_radius <= 0), "base_radius", s.base_radius, "must be > 0");
 }
 
-/// Torque at the motor_position axis that tells the flanks apart: one record's columns differ in what lies
+/// Torque at the motor_position axis that distinguishes the flanks: one record's columns differ in what lies
 /// between sensor and teeth.
 struct FlankTorque {
   const std::vector<double>& values;
@@ -84,7 +85,8 @@ FlankTorque flank_torque(const record::Record& record, const PositionDifferenceS
     if (record.has(channel)) return {record.column(channel), 1};
   if (!record.has(Channel::output_torque))
     throw Refusal{Status::insufficient_data,
-                  "the record has no motor_torque, sensor_torque or output_torque to tell the flanks apart"};
+                  "the record has no motor_torque, sensor_torque or output_torque to distinguish the flanks: "
+                  "record one of them"};
   const double sign = settings.output_torque_reversed ? -1 : 1;
   return {record.column(Channel::output_torque), sign / settings.load_ratio, true};
 }
@@ -133,7 +135,7 @@ TwoEncoders without_skew(TwoEncoders motion, double skew) {
   return motion;
 }
 
-/// Skew of the encoders beside the declared one, where the record tells it apart from zero; else 0 with an
+/// Skew of the encoders beside the declared one, where the record shows that it is not zero; else 0 with an
 /// unknown error. The flanks hold a small one like a friction of the motor.
 signal::Measured clear_skew(const TwoEncoders& motion, double inertia) {
   try {
@@ -216,17 +218,18 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
   }
 }
 
-const char* what_lacks(FlanksLack lack) {
-  switch (lack) {
-    case FlanksLack::both_directions:
-      return "each flank is pressed in one direction of motion only, where play is not told from the dry "
-             "friction of the motor; loads that drive, or that are braked, would do";
-    case FlanksLack::whole_windows:
+const char* remedy_of(FlankObstacle obstacle) {
+  switch (obstacle) {
+    case FlankObstacle::one_direction:
+      return "each flank is pressed in one direction of motion only: play looks like the dry friction of the "
+             "motor there; loads that drive, or that are braked, would do";
+    case FlankObstacle::chatter:
       return "flanks change within a few samples: a drive that chatters; calmer torque or faster sampling "
              "would do";
-    case FlanksLack::own_part:
-      return "each flank is pressed in a part of the path, or at a torque, of its own, where play is not "
-             "told from errors of the encoders and from what the teeth yield; moves over other paths and at "
+    case FlankObstacle::own_part:
+      return "each flank is pressed in a part of the path, or at a torque, of its own: play looks like "
+             "errors "
+             "of the encoders, or like what the teeth yield; moves over other paths and at "
              "other speeds would do";
     default:
       return "torque does not press both flanks (10 % of the time at least); loads that drive, or that are "
@@ -235,7 +238,7 @@ const char* what_lacks(FlanksLack lack) {
 }
 
 void require_sound(const FlankFit& fit) {
-  if (!fit.found) throw Refusal{Status::out_of_domain, what_lacks(fit.lack)};
+  if (!fit.found) throw Refusal{Status::out_of_domain, remedy_of(fit.obstacle)};
   if (fit.stays < kFewestStays)
     throw Refusal{Status::insufficient_data, "the motor lies on a flank only " + std::to_string(fit.stays) +
                                                  " times, needed are " + std::to_string(kFewestStays)};
@@ -257,25 +260,25 @@ double torque_size(const TwoEncoders& motion, double share) {
   return signal::quantile(size, share);
 }
 
-/// What the parts of a record tell, in as many as half of them still tell something.
-std::vector<FlankFit> told_by_parts(const FlankReading& whole) {
+/// What the parts of a record give, in as many as half of them still give something.
+std::vector<FlankFit> fits_of_parts(const FlankReading& whole) {
   const std::size_t n = whole.windows.size();
   for (std::size_t parts = kMostParts; parts > 1; parts /= 2) {
-    std::vector<FlankFit> told;
+    std::vector<FlankFit> fits;
     for (std::size_t k = 0; k < parts; ++k) {
       if (n / parts < kFewestWindows) break;
       const FlankFit fit =
           fit_flanks(part_of(whole.windows, k * n / parts, (k + 1) * n / parts), whole.model);
-      if (fit.found && fit.stays >= kFewestStays) told.push_back(fit);
+      if (fit.found && fit.stays >= kFewestStays) fits.push_back(fit);
     }
-    if (2 * told.size() >= parts) return told;
+    if (2 * fits.size() >= parts) return fits;
   }
   return {};
 }
 
 /// Noise of the torque draws the compliance, and with it the play, towards that of no deflection at all. And
 /// a play that is another as soon as windows are longer, or by other windows that leave as little, is none.
-void require_told(const FlankReading& reading) {
+void require_one_play(const FlankReading& reading) {
   const FlankFit& fit = reading.fit;
   if (!std::isfinite(fit.attenuation) || !std::isfinite(reading.windows_change))
     throw Refusal{
@@ -285,41 +288,41 @@ void require_told(const FlankReading& reading) {
     throw Refusal{
         Status::out_of_domain,
         fmt::format("the play changes by {:.4g} rad with the length of the windows: motion that is too "
-                    "slow or too even to tell play from deflection",
+                    "slow or too even to distinguish play from deflection",
                     reading.windows_change)};
   if (std::abs(reading.another_gap - fit.gap) > kPartChange * fit.gap + kPartErrors * error_of(fit))
     throw Refusal{Status::out_of_domain,
                   fmt::format("the play is {:.4g} rad over some windows and {:.4g} rad over others that are "
-                              "told as well: the torque, or the teeth, are not as declared",
+                              "read as well: the torque, or the teeth, are not as declared",
                               fit.gap, reading.another_gap)};
 }
 
 /// An interval as wide as the elastic deflection, or one twice as wide as the play and as a good part of the
-/// deflection, says that play is not told from that.
+/// deflection, says that play is not distinguished from that.
 void require_worth_saying(const FlankReading& reading, double width, double large_torque) {
   const double elastic = std::abs(reading.fit.compliance_factor * reading.model.elastic(large_torque));
   if (width > std::min(elastic, std::max(2 * reading.fit.gap, kWorthSaying * elastic)))
     throw Refusal{
         Status::out_of_domain,
-        fmt::format("the play is told to {:.4g} rad only, where the teeth yield by {:.4g} rad: too few "
-                    "torques, or too few reversals, to tell play from deflection",
+        fmt::format("the play is known to {:.4g} rad only, where the teeth yield by {:.4g} rad: too few "
+                    "torques, or too few reversals, to distinguish play from deflection",
                     width, elastic)};
 }
 
 /// A play that grows within the record gives groups of deflections that are those of no machine, and a play
-/// that lies anywhere. `whole`: what all of it tells.
+/// that lies anywhere. `whole`: what all of it gives.
 void require_constant(const FlankReading& whole) {
-  const std::vector<FlankFit> told = told_by_parts(whole);
-  if (told.empty()) return;
+  const std::vector<FlankFit> fits = fits_of_parts(whole);
+  if (fits.empty()) return;
   const auto less = [](const FlankFit& a, const FlankFit& b) { return a.gap < b.gap; };
-  const auto [least, most] = std::minmax_element(told.begin(), told.end(), less);
+  const auto [least, most] = std::minmax_element(fits.begin(), fits.end(), less);
   const double errors = kPartErrors * std::hypot(least->standard_error, most->standard_error) +
                         kPartResiduals * std::max(least->residual, most->residual);
   const double over_position = whole.fit.varies ? whole.fit.largest_gap - whole.fit.least_gap : 0;
   if (most->gap - least->gap > kPartChange * most->gap + errors + over_position)
     throw Refusal{
         Status::out_of_domain,
-        fmt::format("the play is not the same throughout the record: parts of it tell {:.4g} to {:.4g} rad",
+        fmt::format("the play is not the same throughout the record: parts of it give {:.4g} to {:.4g} rad",
                     least->gap, most->gap)};
 }
 
@@ -347,7 +350,7 @@ double declared_error(const TwoEncoders& motion, const PositionDifferenceSetting
   return 2 * settings.declared_uncertainty * std::abs(settings.elastic_deflection(level));
 }
 
-/// What the flanks tell, and how wide the interval must be for what is known of the record [rad].
+/// What the flanks show, and how wide the interval must be for what is known of the record [rad].
 struct Answer {
   FlankFit fit;
   double half = 0;                // of the interval, about each of
@@ -381,7 +384,7 @@ struct Unskewed {
 };
 
 /// Friction that is not as declared looks like a skew to whoever looks at the whole record: it is taken out
-/// where the flanks are then told more surely.
+/// where the flanks are then known more surely.
 Unskewed read_unskewed(const TwoEncoders& motion, const FlankModel& model, double torque) {
   Unskewed together{read_flanks(motion, model, torque), {0, 0}};
   const signal::Measured skew = clear_skew(motion, model.inertia);
@@ -415,7 +418,7 @@ Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
   const auto [reading, skew] = read_unskewed(motion, model, large_torque);
   const FlankFit& fit = reading.fit;
   require_sound(fit);
-  require_told(reading);
+  require_one_play(reading);
   require_constant(reading);
   const double elastic = fit.compliance_factor * reading.model.elastic(large_torque);
   const double model_error = reading.declared_law

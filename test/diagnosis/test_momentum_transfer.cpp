@@ -149,7 +149,7 @@ TEST(MomentumTransfer, TravelOfAFreeFlightWithoutATorque) {
         EXPECT_GE(e.angle_upper, 0.98 * gap) << tachometer << ' ' << gap;
         // Two samples of the speed at the impact.
         EXPECT_NEAR(e.backlash_angle, gap, 2 * std::sqrt(2 * kTorque * gap / kInertia) / kRate);
-        EXPECT_NE(e.message.find("told from the motion"), std::string::npos) << e.message;
+        EXPECT_NE(e.message.find("estimated from the motion"), std::string::npos) << e.message;
       }
 }
 

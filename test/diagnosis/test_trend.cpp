@@ -73,7 +73,7 @@ TEST(Trend, SaysWhyThereIsNone) {
   none(same, "9 points at different times");
   for (TrendPoint& p : day) p.time = kStart + (p.time - kStart) / 20;
   none(day, "the points span 22.8 h, at least 24 h are needed");
-  const Trend flat = none(line(20, 0), "growth cannot be told from none: 0 um per year (95 %: 0 to 0)");
+  const Trend flat = none(line(20, 0), "growth is not distinguished from none: 0 um per year (95 %: 0 to 0)");
   EXPECT_TRUE(flat.known);
   EXPECT_EQ(flat.rate, 0);
 }

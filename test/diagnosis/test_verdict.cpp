@@ -254,7 +254,7 @@ TEST(Verdict, ManyDoNotOutvoteOne) {
       EXPECT_EQ(v.dissenters.size(), all.size());
       EXPECT_TRUE(mentions(v, "cannot tell; disagree: right 5e-05 m (95 %: 4.9e-05 to 5.1e-05)"))
           << v.message;
-      EXPECT_TRUE(mentions(v, "nothing on the record tells who is right")) << v.message;
+      EXPECT_TRUE(mentions(v, "nothing in the record shows which is right")) << v.message;
     }
   }
   const Verdict v = combined({ok("a", 5e-5, 1e-5), ok("b", 7e-5, 1e-5 + 1e-12)});  // the intervals just touch

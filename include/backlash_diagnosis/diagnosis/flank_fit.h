@@ -51,17 +51,16 @@ struct FlankModel {
 };
 
 /// What keeps a record from showing two flanks; the later, the closer it comes.
-enum class FlanksLack {
-  pressed,          ///< a flank is pressed in less than 10 % of the windows
-  both_directions,  ///< each is pressed in one direction of motion only: dry friction of the motor looks
-                    ///< alike
-  whole_windows,    ///< flanks change within the windows
-  own_part,         ///< position, speed, acceleration and torque tell which is pressed
-  nothing
+enum class FlankObstacle {
+  not_pressed,    ///< a flank is pressed in less than 10 % of the windows
+  one_direction,  ///< each is pressed in one direction of motion only: dry friction of the motor looks alike
+  chatter,        ///< flanks change within the windows
+  own_part,       ///< position, speed, acceleration and torque determine which is pressed
+  none
 };
 
 struct FlankFit {
-  FlanksLack lack = FlanksLack::pressed;  ///< `nothing` where `found`
+  FlankObstacle obstacle = FlankObstacle::not_pressed;  ///< `none` where `found`
   /// Both flanks are pressed (10 % of the windows on each), in either direction of motion, and which is no
   /// function of position, speed, acceleration and torque (of the squares of `side` these leave 0.3 % and
   /// more).
@@ -73,7 +72,7 @@ struct FlankFit {
   double compliance_factor = 1;           // g
   double scale_error = 0;                 // slope of f over q_L
   /// rad, what the gap gains if all of the residual is noise of the torque, which draws the compliance
-  /// towards 0 (Fuller 1987, Section 1.1); infinite where then no compliance is told.
+  /// towards 0 (Fuller 1987, Section 1.1); infinite where then no compliance is left.
   double attenuation = 0;
   double residual = 0;           // rad, rms
   std::size_t used[2] = {0, 0};  // windows on the negative and the positive flank
