@@ -149,8 +149,8 @@ void warn_of_scale(const ArmRig& declared, ArmFit& fit) {
                error = std::hypot(declared.common_error, std::sqrt(own) / count);
   if (std::fabs(std::log(scale)) > kFarFromDeclared * error)
     fit.warnings.push_back(fmt::format(
-        "by the weight the torque constants are {:.3g} times the declared ones, which are known to "
-        "{:.2g} %: look whether the weight is right, and of this record",
+        "the known weight makes the torque constants {:.3g} times the declared ones, which are known to "
+        "{:.2g} %: check the weight, and that it belongs to this record",
         scale, 100 * error));
 }
 

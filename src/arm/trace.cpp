@@ -183,8 +183,8 @@ void Tracer::report_chain(const std::vector<Candidate>& all, std::size_t best, c
   const double common = rig_.fitted ? rig_.common_error : last.fit.rig.common_error;
   if (named.freedom.payload && common > 0)
     trace_.notes.push_back(fmt::format(
-        "the mass has the scale of the torque constants, which all together are known to {:.2g} %, "
-        "as its error holds; a known weight measures them (identify --payload)",
+        "the mass scales with the torque constants, which together are known to {:.2g} % (part of its "
+        "error); a known weight measures them (identify --payload)",
         100 * common));
   for (const Candidate& c : all)
     if (c.reason.empty() && named.freedom.payload && c.freedom.payload &&

@@ -100,7 +100,7 @@ void ArmChanges::take(const FoundChainChange& found, const arm::ArmRecord& recor
   const std::string name = described(found.effect, rig_.chain);
   out_.different.push_back(name);
   out_.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                          ": that is no change within it");
+                          ": it did not change within the record");
 }
 
 /// Each is named beside the other where both explain it alike.
@@ -210,7 +210,7 @@ void ArmChanges::add(const std::string& joint, const Changes& one, const ChangeS
   for (const std::string& name : search.different()) {
     out_.different.push_back(named(name));
     out_.warnings.push_back(named("from its beginning the record differs from the healthy ones by " + name +
-                                  ": that is no change within it"));
+                                  ": it did not change within the record"));
   }
   for (const ChangeEffect& e : model.further) out_.healthy_terms.push_back(named(e.name()));
   if (!one.cannot_tell.empty())
@@ -321,10 +321,9 @@ void ArmChanges::add_scale() {
   const double common = arm_->fit().rig.common_error;
   if (common > 0 && std::any_of(chain_.begin(), chain_.end(),
                                 [](const FoundChainChange& f) { return f.effect.values > 1; }))
-    out_.warnings.push_back(
-        "the mass has the scale of the torque constants, which all together are known to " +
-        to_text(std::round(1000 * common) / 10) +
-        " %, as its error holds; a known weight measures them (identify --payload)");
+    out_.warnings.push_back("the mass scales with the torque constants, which together are known to " +
+                            to_text(std::round(1000 * common) / 10) +
+                            " % (part of its error); a known weight measures them (identify --payload)");
 }
 
 Changes ArmChanges::run(const std::vector<arm::ArmRecord>& healthy, const arm::ArmRecord& record) {

@@ -58,7 +58,7 @@ ChannelChanges changes_in(const HealthyModel& model, const record::Record& recor
   out.different = search.different();
   for (const std::string& name : search.different())
     out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                           ": that is no change within it");
+                           ": it did not change within the record");
   for (const DifferentValue& value : different_values(model, search.background(found), linear)) {
     if (std::find(out.different.begin(), out.different.end(), value.name) != out.different.end()) continue;
     out.different.push_back(value.name);

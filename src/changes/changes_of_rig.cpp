@@ -240,7 +240,7 @@ class RigChanges {
       const std::string& name = rig_.effects[d.effect].name;
       out.different.push_back(name);
       out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                             ": that is no change within it");
+                             ": it did not change within the record");
     }
     if (const auto unexplained = s.unexplained(found)) {
       const std::string text =

@@ -93,7 +93,7 @@ Motor collect(const record::Record& record, const MomentumTransferSettings& sett
   if (!tachometer && !record.has(record::Channel::motor_position))
     refuse("the record has neither motor_velocity nor motor_position");
   if (!settings.output_locked && !record.has(record::Channel::load_position))
-    refuse("the load is free and the record has no load_position");
+    refuse("the load is free and the record has no load_position: record it");
   if (record.size() < kFewestSamples)
     refuse("the record has only " + std::to_string(record.size()) + " samples");
   const double interval = record.sampling_interval();

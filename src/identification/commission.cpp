@@ -52,9 +52,8 @@ void put_parameters(Identification& result, const diagnosis::WaveformCommissioni
 void warn(Identification& result, const diagnosis::WaveformCommissioning& found, double doubt) {
   if (doubt > 0)
     result.warnings.push_back(fmt::format(
-        "the torque sensor reads {:.3g} times what motor_torque makes it hold: where not the sensor is off "
-        "but motor_torque, inertias, stiffnesses, damping and friction are by {:.2g} %, which their errors "
-        "hold",
+        "the torque sensor reads {:.3g} times what it should by motor_torque: if the sensor is right, "
+        "inertias, stiffnesses, damping and friction are wrong by {:.2g} %, which is part of their errors",
         found.machine.sensor_gain, 100 * doubt));
   if (!found.untold.empty())
     result.warnings.push_back("the records do not determine " + joined(found.untold) +

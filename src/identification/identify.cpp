@@ -183,10 +183,10 @@ void require_served(const model::Rig& rig) {
   if (rig.input_coupling.rigid && rig.link_locked) return require_locked_output(rig);
   if (!model::has_two_inertias(rig))
     throw CannotIdentify(
-        std::string("identify knows machines of one inertia (mesh: rigid), of two (rigid couplings, free "
-                    "link), with a locked output (rigid input coupling), and with a torque sensor (elastic "
-                    "input coupling, mesh that is linear, a power law or Hunt-Crossley, damping > 0 of motor "
-                    "and couplings, no terms); this rig has ") +
+        std::string(
+            "identify knows one inertia (mesh: rigid), two (rigid couplings, free link), a locked "
+            "output (rigid input coupling), and a torque sensor (elastic input coupling; mesh linear, "
+            "a power law or Hunt-Crossley; damping > 0 of motor and couplings; no terms); this rig has ") +
         (rig.input_coupling.rigid ? "a rigid" : "an elastic") + " input coupling, " +
         (rig.output_coupling.rigid ? "a rigid" : "an elastic") + " output coupling and a " +
         (rig.link_locked ? "locked" : "free") + " link");

@@ -270,7 +270,7 @@ Clearance identify_clearance(const record::Record& record, const ClearanceSettin
         "the load seems to meet no damping on the flanks: they are touched too softly, distrust the gap");
   if (difference > kSensitive * c.gap.value)
     c.warnings.push_back(fmt::format(
-        "the gap hangs on how the push is modelled: {:.4g} rad with a parabola, {:.4g} rad with a cubic",
+        "the gap depends on how the push is modelled: {:.4g} rad with a parabola, {:.4g} rad with a cubic",
         gaps[0].value, gaps[1].value));
   return c;
 }
