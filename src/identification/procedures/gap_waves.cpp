@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
-#include <limits>
-#include <map>
 #include <numeric>
 #include <optional>
 
@@ -16,6 +14,7 @@
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/spectrum.h"
+#include "gap_cells.h"
 
 namespace backlash::identification {
 namespace {
@@ -23,8 +22,6 @@ namespace {
 constexpr double kTurn = 2 * M_PI;
 constexpr double kLeastTurns = 1.02;   // theory: a turn and some of it twice, else whole orders say it all
 constexpr double kCellsPerWave = 6;    // choice: of the highest order
-constexpr int kLeastSamples = 3;       // choice: per cell and run
-constexpr double kLopsided = 0.25;     // choice: of a cell, between the mean places of both runs
 constexpr std::size_t kMostWaves = 8;  // choice
 constexpr int kMultiples = 3;          // choice: k, harmonics of the pinion
 constexpr int kSides = 2;              // choice: n, to either side
@@ -38,92 +35,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What is fitted: the separation of the flanks over places that both runs visited, or each run over its own
-/// places, where `apart`.
-struct Cells {
-  VectorXd place, value;  // rad
-  VectorXd share;         // -, of the gap in the value: 1, or half with the sign of the run
-  bool apart = false;
-  double width = 0;  // rad
-  double turns = 0;  // of the load, of either run where apart
-  double freedom() const { return double(value.size()); }
-};
-
-struct Mean {
-  double load = 0, difference = 0;
-  int count = 0;
-};
-
-std::map<long, Mean> means_of(const GapRun& run, double width) {
-  std::map<long, Mean> means;
-  for (std::size_t i = 0; i < run.load.size(); ++i) {
-    Mean& m = means[std::lround(run.load[i] / width)];
-    m.load += run.load[i], m.difference += run.difference[i], ++m.count;
-  }
-  return means;
-}
-
-VectorXd vector_of(const std::vector<double>& values) {
-  return Eigen::Map<const VectorXd>(values.data(), Index(values.size()));
-}
-
-Cells shared_cells(const GapRun& forward, const GapRun& reverse, double width) {
-  const std::map<long, Mean> f = means_of(forward, width), r = means_of(reverse, width);
-  std::vector<double> place, separation;
-  for (const auto& [cell, a] : f) {
-    const auto other = r.find(cell);
-    if (other == r.end() || a.count < kLeastSamples || other->second.count < kLeastSamples) continue;
-    const Mean& b = other->second;
-    if (std::fabs(a.load / a.count - b.load / b.count) > kLopsided * width) continue;
-    place.push_back(0.5 * (a.load / a.count + b.load / b.count));
-    separation.push_back(a.difference / a.count - b.difference / b.count);
-  }
-  Cells cells;
-  cells.place = vector_of(place), cells.value = vector_of(separation);
-  cells.share = VectorXd::Ones(cells.place.size());
-  cells.width = width;
-  cells.turns = double(place.size()) * width / kTurn;
-  return cells;
-}
-
-Cells separate_cells(const GapRun& forward, const GapRun& reverse, double width) {
-  std::vector<double> place, value, share;
-  double least = std::numeric_limits<double>::infinity();
-  for (const GapRun* run : {&forward, &reverse}) {
-    const std::size_t before = place.size();
-    for (const auto& [cell, m] : means_of(*run, width)) {
-      if (m.count < kLeastSamples) continue;
-      place.push_back(m.load / m.count);
-      value.push_back(m.difference / m.count);
-      share.push_back(run == &forward ? 0.5 : -0.5);
-    }
-    least = std::min(least, double(place.size() - before) * width / kTurn);
-  }
-  return {vector_of(place), vector_of(value), vector_of(share), true, width, least};
-}
-
-/// What a mean over a cell leaves of a wave.
-double of_cell(double order, double width) {
-  const double half = 0.5 * order * width;
-  return half > 0 ? std::sin(half) / half : 1;
-}
-
-/// Columns of one wave: of the gap, and of the centre line where that does not cancel; sine and cosine.
-Index columns_per_wave(const Cells& cells) {
-  return cells.apart ? 4 : 2;
-}
-
-void put_wave(const Cells& cells, double order, MatrixXd& a, Index column) {
-  const double shown = of_cell(order, cells.width);
-  const Eigen::ArrayXd sine = shown * (order * cells.place.array()).sin(),
-                       cosine = shown * (order * cells.place.array()).cos();
-  a.col(column) = cells.share.array() * sine;
-  a.col(column + 1) = cells.share.array() * cosine;
-  if (!cells.apart) return;
-  a.col(column + 2) = sine;
-  a.col(column + 3) = cosine;
-}
-
 int whole_orders(const GapWaveSettings& settings) {
   return int(std::ceil(settings.highest_order));
 }
@@ -136,23 +47,7 @@ struct Trial {
   double chance = 1;
 };
 
-/// Without the waves: mean and whole orders; of runs apart with the scale of the motor, each for itself.
-MatrixXd base_columns(const Cells& cells, int whole) {
-  const Index n = cells.place.size(), per_run = cells.apart ? 2 + 2 * whole : 1 + 2 * whole;
-  MatrixXd a = MatrixXd::Zero(n, cells.apart ? 2 * per_run : per_run);
-  for (Index i = 0; i < n; ++i) {
-    Index c = cells.share[i] > 0 ? 0 : per_run;
-    a(i, c++) = 1;
-    for (int order = 1; order <= whole; ++order) {
-      a(i, c++) = std::sin(order * cells.place[i]);
-      a(i, c++) = std::cos(order * cells.place[i]);
-    }
-    if (cells.apart) a(i, c) = cells.place[i];
-  }
-  return a;
-}
-
-MatrixXd columns(const Cells& cells, const MatrixXd& base, const std::vector<Trial>& waves) {
+MatrixXd columns(const GapCells& cells, const MatrixXd& base, const std::vector<Trial>& waves) {
   const Index per = columns_per_wave(cells);
   MatrixXd a(base.rows(), base.cols() + per * Index(waves.size()));
   a.leftCols(base.cols()) = base;
@@ -170,7 +65,7 @@ double f_tail(double f, double of_wave, double freedom) {
 /// What is left of the values beside some columns, and by how much less a further order leaves.
 class RestBeside {
  public:
-  RestBeside(const Cells& cells, const MatrixXd& a) : cells_(cells) {
+  RestBeside(const GapCells& cells, const MatrixXd& a) : cells_(cells) {
     q_ = signal::orthonormal_basis(a);
     left_ = beside(cells.value);
     correlation_ = signal::correlation_length({left_.begin(), left_.end()});
@@ -201,7 +96,7 @@ class RestBeside {
   Matrix beside(const Matrix& m) const {
     return m - q_ * (q_.transpose() * m);
   }
-  const Cells& cells_;
+  const GapCells& cells_;
   MatrixXd q_;
   VectorXd left_;
   double correlation_ = 1;
@@ -228,7 +123,7 @@ std::vector<Trial> orders_of(const rig_file::Drive* drive, double highest) {
 
 class Search {
  public:
-  Search(const Cells& cells, const GapWaveSettings& settings)
+  Search(const GapCells& cells, const GapWaveSettings& settings)
       : cells_(cells),
         turns_(cells.turns),
         settings_(settings),
@@ -400,7 +295,7 @@ class Search {
     return all;
   }
 
-  const Cells& cells_;
+  const GapCells& cells_;
   double turns_;
   GapWaveSettings settings_;
   MatrixXd base_;
@@ -433,7 +328,7 @@ GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapW
   GapWaves result;
   result.turns_to_meet = turns_to_meet(settings.drive);
   const double width = kTurn / (kCellsPerWave * settings.highest_order);
-  Cells cells = shared_cells(forward, reverse, width);
+  GapCells cells = shared_cells(forward, reverse, width);
   if (cells.turns < kLeastTurns) cells = separate_cells(forward, reverse, width);
   result.turns = cells.turns;
   const bool pinion = result.turns_to_meet > 0;
