@@ -22,7 +22,7 @@ class ArmChanges {
       : rig_(rig), settings_(settings), progress_(progress) {
     settings_.cutoff = rig.identification.torque_cutoff;
     settings_.position_cutoff = rig.identification.kinematics_cutoff;
-    // The joints share the rate, with two channels each, and the chain is one more.
+    // The joints share the rate of false alarms: two channels each, and one for the chain.
     settings_.false_alarms_per_hour /= double(2 * rig.joints.size() + 1);
   }
 
@@ -112,7 +112,7 @@ void ArmChanges::name_alike(FoundChainChange& of_chain, const ArmJoint& joint, F
   own.alike.push_back(described(of_chain.effect, rig_.chain));
 }
 
-/// Whether it is what a change of the chain leaves in a joint: more load rubs more, and shapes are
+/// Whether it is only what a change of the chain leaves in a joint: more load rubs more, and shapes are
 /// idealisations.
 bool ArmChanges::is_of_chain(const ArmJoint& joint, std::size_t place, const FoundChange& next) const {
   const Change change = joint.search->change_of(next, joint.found, false);
@@ -126,7 +126,7 @@ bool ArmChanges::is_of_chain(const ArmJoint& joint, std::size_t place, const Fou
   });
 }
 
-/// The clearest first, be it of one joint or of the chain; then what it leaves.
+/// The clearest change first, of one joint or of the chain; then those in what it leaves.
 void ArmChanges::search(const arm::ArmRecord& record) {
   std::deque<ArmJoint>& joints = arm_->joints();
   std::vector<std::optional<FoundChange>> next(joints.size());
@@ -185,8 +185,8 @@ void ArmChanges::report_pushes(const arm::ArmRecord& record) {
       "nothing else");
 }
 
-/// What no effect explains, where it is small beside a change of the chain: teeth ring and cross the gap
-/// otherwise under another load.
+/// What no effect explains, if it is small beside a change of the chain: under another load teeth ring and
+/// cross the gap in another way.
 bool ArmChanges::is_left_by_chain(const ArmJoint& joint, std::size_t place, const Change& change) const {
   const double noise = joint.model.noise;
   return change.effect == "unknown" &&
@@ -217,7 +217,7 @@ void ArmChanges::add(const std::string& joint, const Changes& one, const ChangeS
     out_.cannot_tell += (out_.cannot_tell.empty() ? "" : "; ") + named(one.cannot_tell);
 }
 
-/// Torques are as well known as the constants that they follow from.
+/// Torques are known no better than the torque constants.
 void ArmChanges::add_constant_error(const ArmJoint& joint, Change& change) const {
   const double relative =
       std::hypot(arm_->fit().rig.common_error, arm_->fit().rig.joints[joint.index].constant_error);
@@ -316,7 +316,7 @@ void ArmChanges::report_deflection(std::size_t index) {
   }
 }
 
-/// A mass has the scale of the torque constants.
+/// A mass scales with the torque constants.
 void ArmChanges::add_scale() {
   const double common = arm_->fit().rig.common_error;
   if (common > 0 && std::any_of(chain_.begin(), chain_.end(),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Of the search for changes what is about faults at one place, and effects of a speed or a way that is
+// The part of the search for changes that finds faults at one place, and effects with a speed or way that is
 // fitted.
 #include <Eigen/Dense>
 #include <algorithm>
@@ -80,7 +80,7 @@ void ChangeSearch::refine_scale(FoundChange& f, const Background& b) const {
       }
 }
 
-/// Columns that are right for a slip of that size: gravity is no straight line.
+/// Columns for a slip of that size: gravity is no straight line.
 void ChangeSearch::refine_slip(FoundChange& f, const Background& b) const {
   if (!f.effect.is_slip() || motion_.sampling.channel != ChangeChannel::torque) return;
   for (int round = 0; round < kRounds && f.score.values.size() > 0; ++round) {
@@ -94,7 +94,7 @@ void ChangeSearch::refine_slip(FoundChange& f, const Background& b) const {
   }
 }
 
-/// With what the scale may be other by: its slope stands beside.
+/// With an unknown scale: its slope is one more column.
 std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Background& b, double noisier,
                                                   bool linear) const {
   ChangeEffect more = f.effect, less = f.effect;
@@ -117,7 +117,7 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
   return size;
 }
 
-/// Shown by passes through its place without the one that says most: a push is at one place as well.
+/// Passes show it even without the one that shows most: a push is at one place as well.
 bool ChangeSearch::repeats(const FoundChange& f, const Background& b) const {
   const double from = settings_.block * double(f.from), to = settings_.block * double(f.to);
   return f.effect.width < screen_.widest() &&

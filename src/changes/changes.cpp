@@ -20,7 +20,8 @@ struct ChannelChanges {
   Changes reported;
 };
 
-/// What the load of the teeth may be other by: what the motor's torque shows, on whichever side of the gap.
+/// By how much the load of the teeth may have changed: what the motor's torque shows, on either side of the
+/// gap.
 std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& changes, double block) {
   if (changes.empty()) return {};
   return [changes, block](const Moment& m) {
@@ -82,7 +83,7 @@ double share_behind(const model::Rig& rig) {
   return behind / (rig.motor.inertia + rig.input_coupling.inertia + rig.pinion.inertia + behind);
 }
 
-/// On which side of the gap friction is that the motor's torque shows as another: behind it, it loads the
+/// On which side of the gap friction has changed, by the motor's torque: friction behind the gap loads the
 /// teeth and deflects them by `compliance`. 1: behind, 0: before; NaN: not known.
 double side_of(const signal::Measured& torque, const signal::Measured& deflection, double compliance,
                const ChangeSettings& settings) {
@@ -122,7 +123,7 @@ void add_deflection(const Changes& more, Changes& all) {
   all.cannot_tell += more.cannot_tell;
 }
 
-/// What one channel cannot name while the other names it, or cannot either, is reported once.
+/// A change that one channel cannot name is reported once, whether the other names it or not.
 void unite_unknown(const ChangeSettings& settings, Changes& all) {
   std::vector<Change> kept;
   for (std::size_t i = 0; i < all.changes.size(); ++i) {
@@ -142,7 +143,7 @@ void unite_unknown(const ChangeSettings& settings, Changes& all) {
   all.changes = kept;
 }
 
-/// Two inertias: the torque first, whose changes may load the teeth otherwise; then the deflection.
+/// Two inertias: the torque first, as its changes may change the load of the teeth; then the deflection.
 Changes changes_of_two(const model::Rig& rig, double behind, const std::vector<record::Record>& healthy,
                        const record::Record& record, MotionSampling sampling, ChangeSettings settings,
                        const Progress& progress) {

@@ -24,7 +24,7 @@ constexpr double kSureOfLeft = 0.999;  // chance that the others together explai
 constexpr double kMostUnexplained = 1.0 / 3;   // of the stretches, beside those that are reported. Choice
 constexpr std::size_t kFewestUnexplained = 3;  // in a row, that are a change. Choice: one may be odd
 
-/// Stretches with no machine in a row, and what is before them.
+/// Stretches in a row that no machine explains, and what is before them.
 struct UnknownRun {
   std::size_t first = 0, last = 0;
 };
@@ -118,7 +118,7 @@ class RigChanges {
     return best;
   }
 
-  /// Of a gain its change.
+  /// The change that a gain stands for.
   std::vector<ChangeSize> size_of(const RigChange& c) const {
     const RigEffect& effect = rig_.effects[c.effect];
     const bool gap = effect.value == 0;
@@ -192,7 +192,7 @@ class RigChanges {
     }
   }
 
-  /// What was not judged is no health.
+  /// A stretch that was not judged is not healthy.
   void report_unjudged(Changes& out) const {
     std::size_t left = 0, count = 0;
     std::string reason;

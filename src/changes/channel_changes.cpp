@@ -37,8 +37,8 @@ void report_loud(const ChangeSearch& search, const LoudStretch& loud, std::vecto
       "motion of this kind";
 }
 
-/// Where it is louder than in the rest, though less than that. More than the changes explain is no shape of
-/// theirs.
+/// Where it is louder than in the rest, but less than that. More than the changes explain is not their
+/// shape.
 void report_louder(const ChangeSearch& search, const std::vector<FoundChange>& found, double explained,
                    Changes& out) {
   const std::optional<LoudStretch> louder = search.louder(found);

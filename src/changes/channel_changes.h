@@ -13,12 +13,12 @@ namespace backlash::changes {
 /// "37 s"
 std::string whole_seconds(double time);
 
-/// What no effect explains is no health. `of_two`: inertias.
+/// What no effect explains does not count as healthy. `of_two`: two inertias.
 void report_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
                         const ChangeSettings& settings, Changes& out);
 
-/// What is over soon is no change of the machine, whatever it looks like: a push, or a fault that few passes
-/// show.
+/// What is over soon is no change of the machine, whatever it looks like: a push, or a fault that a few
+/// passes show.
 void take_out_short(const ChangeSettings& settings, Changes& out);
 
 }  // namespace backlash::changes

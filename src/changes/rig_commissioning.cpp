@@ -102,9 +102,9 @@ void take_machine(const record::Record& record, const ChangeSettings& settings, 
 }
 
 /// The values one by one, and:
-///   motor_torque_gain    the motor's torque is 1/k of what is recorded: all torques of the machine times k,
-///   and
-///                        the sensor's gain over k, move as it does
+///   motor_torque_gain    the motor's torque is 1/k of what is recorded: all torques of
+///                        the machine times k, and the sensor's gain
+///                        over k, move as it does
 ///   motor_position_gain  by the symmetry of waveform.h: values times k^-power show k times the position
 std::vector<RigEffect> effects_of(const HealthyRig& rig, const ChangeSettings& settings) {
   const auto count = static_cast<Eigen::Index>(rig.values.size());

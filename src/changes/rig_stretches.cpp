@@ -44,7 +44,7 @@ std::vector<std::size_t> reversals_of(const std::vector<double>& torque, double 
   return found;
 }
 
-/// Stamps that are no clock's say nothing of the machine.
+/// Stamps that no clock made say nothing of the machine.
 bool even(const record::Record& record, const Stretch& at) {
   const double interval = record.sampling_interval();
   const auto first = std::lower_bound(record.time.begin(), record.time.end(), at.from);
@@ -62,13 +62,13 @@ bool explained(const FittedStretch& s, const HealthyRig& rig) {
   return s.left_out <= rig.left_out + kMoreLeftOut;
 }
 
-/// Score and information at the healthy machine, in the coordinates of its values, less sure by what a
-/// stretch may be off by itself: of the information I and that spread Q the rest is (1 + I Q)^-1 I.
+/// Score and information at the healthy machine, in the coordinates of its values, made less certain by what
+/// a stretch may be off by itself: of the information I and that spread Q the rest is (1 + I Q)^-1 I.
 void take_score(const diagnosis::WaveformValues& found, const HealthyRig& rig, FittedStretch& out) {
   const Eigen::Index count = found.z.size();
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(count), at = found.z, jitter(count);
   const double unit = rig.values[0].value;
-  // Where there is next to no play, its logarithm is anything.
+  // Where there is almost no play, its logarithm is arbitrary.
   scale[0] = unit / (std::max(found.backlash, kLeastPlay * unit) * found.spread[0]);
   at[0] = (found.backlash - rig.backlash) / unit;
   for (Eigen::Index i = 0; i < count; ++i)

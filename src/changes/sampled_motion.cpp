@@ -73,7 +73,7 @@ double median_of_three(double a, double b, double c) {
 }
 
 /// Takes out single values that stick out of both neighbours as noise never does: one wrong reading would
-/// outweigh an hour of right ones. What is taken out is not there.
+/// outweigh an hour of right ones. Such a value becomes a lost sample.
 void take_out_spikes(std::vector<double>& values, std::vector<char>& there, const ChangeSettings& settings) {
   const std::vector<double> raw = values;
   const auto middle = [&](std::size_t k) { return median_of_three(raw[k - 1], raw[k], raw[k + 1]); };
@@ -98,7 +98,7 @@ bool rests_on_flank(const SampledMotion& motion, std::size_t k) {
   return std::min(std::fabs(now.mesh), now.side() * other) > least;
 }
 
-/// Samples that are there, move and rest on a flank, and have such about them for `guard`.
+/// Samples that are present, move and rest on a flank, as do those within `guard` about them.
 std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& there, std::size_t guard,
                          const ChangeSettings& settings) {
   const std::size_t n = there.size();
@@ -110,7 +110,7 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
     const double pull = std::fabs(motion.moments[k].acceleration);
     const bool known = fast == 0 || (speed < fast && pull < hard);
     if (there[k] && speed > slow && known && rests_on_flank(motion, k)) continue;
-    // Filters ring for long after a jump of the position, which no motion is.
+    // Filters ring for long after a jump of the position that no motion makes.
     const bool jump = fast > 0 && (speed > settings.jump * fast || pull > settings.jump * hard);
     const std::size_t reach = jump ? settings.jump_guard * guard : guard;
     const std::size_t last = std::min(n, k + reach + 1);
