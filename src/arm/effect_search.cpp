@@ -25,7 +25,7 @@ constexpr double kScaleStep = 0.7;         // of a speed or distance, between th
 constexpr std::size_t kSamplesPerRow = 8;  // of a column before its low-pass, at least; choice
 constexpr int kRefinements = 4;            // of a shape, each a third of the step before; choice
 
-/// With fewer samples, where there are far more than the low-pass leaves: a search takes hundreds of columns.
+/// Thinned where there are far more samples than the low-pass leaves: a search takes hundreds of columns.
 ArmMotion thinned(const ArmMotion& m) {
   const std::size_t apart = m.rows.size() > 1 ? m.rows[1] - m.rows[0] : 1;
   std::size_t by = std::max<std::size_t>(1, apart / kSamplesPerRow);
@@ -185,7 +185,7 @@ std::vector<JointEffect> Search::effects_of(std::size_t j) const {
         for (const double time : kDistances) add(spec, time * speed_[j]);
         break;
       case EffectShape::none:
-        // What the fit has of a drive it has of all records.
+        // The fit knows a drive from all records.
         if (everywhere_ && (stands_for_term(spec, fit_.rig) || spec.id == gain_of_drive().id)) break;
         if (!is_coupling({spec.id, 0, "", Eigen::Vector2d::Zero()}))
           add(spec);

@@ -76,7 +76,7 @@ Rubbing rubbing_of(const JointDrive& drive, const RecordMotions& motions, std::s
   return sum;
 }
 
-/// Friction takes power. Where it comes out as a drive, torque and position count against each other.
+/// Friction takes power. Where it comes out as driving, torque or position has the wrong sign.
 void require_rubbing(const ArmFit& fit, const RecordMotions& motions) {
   for (std::size_t j = 0; j < fit.rig.joints.size(); ++j) {
     const JointDrive& drive = fit.rig.joints[j];
@@ -135,7 +135,7 @@ ArmFit fit_loaded(const ArmRig& rig, std::vector<RecordMotions> records,
   return fit;
 }
 
-/// A weight that contradicts the declared constants may be another one, or of another record.
+/// A weight that contradicts the declared constants may be wrong, or belong to another record.
 void warn_of_scale(const ArmRig& declared, ArmFit& fit) {
   double sum = 0, own = 0, count = 0;
   for (std::size_t j = 0; j < declared.joints.size(); ++j) {

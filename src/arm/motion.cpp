@@ -49,8 +49,8 @@ Kinematics smooth_kinematics(const record::Record& r, record::Channel position, 
   return k;
 }
 
-/// The load's encoder is that of the link: it follows the motor's but for its zero and a deflection, and
-/// turns the same way. One that counts the other way moves against the motor by twice of what the joint
+/// Whether the load's encoder is that of the link: it follows the motor's but for its zero and a deflection,
+/// and turns the same way. One that counts the other way moves against the motor by twice of what the joint
 /// moves, and read backwards hardly at all; a link in its gap moves as much against the motor as read
 /// backwards.
 bool follows(const record::Record& r) {

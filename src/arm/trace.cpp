@@ -106,7 +106,7 @@ void Tracer::report_effects(const std::vector<Candidate>& found, const Motions& 
   }
 }
 
-/// Of an effect of a joint whether the training records have it.
+/// Notes whether the training records have the effect of a joint.
 void Tracer::report_onset(const Candidate& c) {
   const FreeEffect& effect = c.freedom.effects.back();
   if (!rig_.fitted && !effect.everywhere)
@@ -114,7 +114,8 @@ void Tracer::report_onset(const Candidate& c) {
                            " is of the test record, the training records do not have it");
 }
 
-/// What is taken away on one side does nearly what a body on the other side does: values hold both.
+/// A body taken away on one side does nearly what a body added on the other side does: the intervals contain
+/// both.
 void Tracer::report_rival(ArmStep& step, const Candidate& rival) {
   const ArmStep other = step_of(rival, rival.fit, rig_, settings_.law);
   for (std::size_t i = 0; i < step.parameters.size(); ++i) {
@@ -194,7 +195,7 @@ void Tracer::report_chain(const std::vector<Candidate>& all, std::size_t best, c
                              " does nearly as well");
 }
 
-/// Whether what was found of the chain is still there beside what was found after it, and explains the
+/// Whether what was found of the chain still holds beside what was found after it, and explains the
 /// joints: where one is left unexplained, values that take most of it away need not be those of the machine.
 /// What the training records show may be another one in the test record, see changed_since().
 bool Tracer::holds(const Candidate& found, const Candidate& last, const Motions& judged) const {
@@ -217,7 +218,7 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   const std::vector<double> gains = gain_shares(without.fit, without.freedom, as_fitted(fitted, true));
   for (std::size_t i = 0; i < all.size(); ++i) {
     report(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
-    // Whether something has come or gone is clear from the last link.
+    // The last link shows whether something has come or gone.
     if (all[i].freedom.payload && i > 1 && (all[0].all > all[1].all) != (all[i].freedom.payload_sign > 0))
       all[i].reason = "not tried";
     else if (of_joint(all[i]) && gains[all[i].joint] < settings_.least_at_joint / 2)
@@ -288,7 +289,7 @@ std::optional<ArmTrace::Unexplained> Tracer::worst_unexplained(const std::vector
   return out ? out : worst_left(errors);
 }
 
-/// The training records may lack as much, and let expect it.
+/// The training records may leave as much, so that it is expected.
 std::optional<ArmTrace::Unexplained> Tracer::worst_left(const std::vector<double>& errors) const {
   std::optional<ArmTrace::Unexplained> out;
   double worst = settings_.much;

@@ -21,7 +21,7 @@ class EffectSteps {
   std::optional<Candidate> next(const Candidate& model) const;
   /// Instead of a factor of all friction of that joint.
   std::optional<Candidate> other_friction(const Candidate& model, std::size_t joint) const;
-  /// Where a joint is left unexplained, what takes the most of it away need not be what it lacks.
+  /// Where a joint stays unexplained, the effect that takes most of it away need not be the missing one.
   void drop_what_does_not_explain(const Candidate& model) const;
 
  private:
@@ -66,7 +66,7 @@ Candidate EffectSteps::with(const Candidate& model, const EffectGuess& guess, bo
   c.freedom.effects.back().everywhere = everywhere;
   c.freedom.effects.back().of_term = is_of_term(guess);
   fits_.fit(c, fitted_);
-  // From where it has come to, so that what is found next does not gain by settling this one.
+  // Starts from the last fit, so that the next effect gains nothing by settling this one.
   for (std::size_t i = 0; i < c.freedom.effects.size(); ++i)
     c.freedom.effects[i].effect = c.fit.effects[i].effect;
   fits_.fit(c, fitted_);
@@ -79,7 +79,8 @@ std::optional<Candidate> EffectSteps::next(const Candidate& model, bool everywhe
   const std::vector<FittedMotion> motions = everywhere ? fits_.motions(fitted_) : as_fitted(fitted_, true);
   int tried = 0;
   for (const EffectGuess& guess : guess_effects(model.fit, model.freedom, motions, everywhere)) {
-    // A factor of all friction beside more of one kind of it may be a factor and more of another kind.
+    // A factor of all friction and more of one kind of friction may also be a factor and more of another
+    // kind.
     if (is_of_term(guess) && model.freedom.rubs_otherwise(guess.effect.joint)) continue;
     if (guess.share < settings.least_at_joint / 2 || tried++ == settings.most_tried) break;
     Candidate c = with(model, guess, everywhere);

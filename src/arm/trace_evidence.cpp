@@ -81,7 +81,7 @@ void bootstrap(Candidate& c, const Squares& s, const ArmTraceSettings& settings)
   c.all = c.gains[joints], c.all_lower = c.lowers[joints];
 }
 
-/// Of unknowns that stand together in a covariance, in the direction in which they are known best.
+/// Standard errors from zero of unknowns with one covariance, in the direction in which they are known best.
 double standard_errors_from_none(const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance,
                                  Eigen::Index place) {
   const Eigen::Index n = values.size();
@@ -97,7 +97,7 @@ constexpr double kFarFromGuess = 0.4;  // of a shape's logarithm; choice: its pr
 
 constexpr double kShapeKnown = 0.25;  // of a shape, its standard error: else it has none; choice
 
-/// Of the rms of what rubs in the drive of its joint, without it.
+/// As a share of the rms friction in the drive of its joint, without the effect.
 double share_of_friction(const Candidate& c, const Motions& judged) {
   double own = 0, all = 0;
   const JointDrive& drive = c.fit.rig.joints[c.joint];
@@ -180,7 +180,7 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
   if (const double explained = std::sqrt(c.gain) * error; explained < settings.least_of_signal)
     return fmt::format("explains {:.1f} % of the channel, {:.1f} % are needed", 100 * explained,
                        100 * settings.least_of_signal);
-  // What is gained is its own work, not that the others were fitted anew beside it.
+  // The gain counts what the effect itself does, not that the others were fitted anew beside it.
   Candidate taken_out = c;
   taken_out.fit.effects.back().effect.values.setZero();
   const double with = relative_errors(c.fit, c.freedom, motions, 0)[c.joint],
