@@ -45,13 +45,13 @@ struct Quantity {
   Member at;
   bool common;  // of all records; else of each
 };
-const char* const kOffset = "offset";  // of a record: the rig file has no place for it
+const char* const kOffsetName = "offset";  // of a record: the rig file has no place for it
 const Quantity kQuantities[] = {{"motor_inertia", &LockedOutput::inertia, true},
                                 {"motor_viscous", &LockedOutput::viscous, true},
                                 {"motor_coulomb", &LockedOutput::coulomb, true},
                                 {"mesh_stiffness", &LockedOutput::stiffness, true},
                                 {"backlash_angle", &LockedOutput::backlash_angle, true},
-                                {kOffset, &LockedOutput::offset, false}};
+                                {kOffsetName, &LockedOutput::offset, false}};
 
 /// Mean by the errors, which grow where the records contradict each other.
 signal::Measured combined(const std::vector<LockedOutput>& found, const Quantity& q,
@@ -168,9 +168,9 @@ ProcedureReport run_locked_output(IdentificationCase& c) {
     if (q.at == &LockedOutput::stiffness) m = less_coupling(m, c.declared);
   }
   for (const auto& [name, value] : values)
-    if (name != kOffset) take(c, name, value, undetermined);
-  c.result.parameters[kOffset] = values.at(kOffset);
-  c.result.units[kOffset] = model::axis_unit("N m", c.declared.linear);
+    if (name != kOffsetName) take(c, name, value, undetermined);
+  c.result.parameters[kOffsetName] = values.at(kOffsetName);
+  c.result.units[kOffsetName] = model::axis_unit("N m", c.declared.linear);
   if (!undetermined.empty())
     c.result.warnings.push_back("the records do not determine " + joined(undetermined) +
                                 ": what the rig file says of it is kept");
