@@ -35,8 +35,8 @@ struct ArmTraceSettings {
                                 // leave up to 0.055, and up to 9.2 times their noise
   double explained = 2;  // the same, of a joint whose friction, or whose motor's torque, an effect scales by
                          // a factor: more is left by what is no factor; choice, see doc/arm.md
-  int most_effects = 3;         // of single joints; choice
-  int most_tried = 3;           // guesses for each; choice (time)
+  int most_effects = 3;  // of single joints; choice
+  int most_tried = 3;    // guesses for each; choice (time)
   double least_at_joint = 0.5;  // share of its joint's squared error that such an effect must take away, and
   double least_of_signal = 0.025;  // rms of what it explains, of the signal's deviation; choice: bristles of
                                    // a UR10e's joints take up to 0.4 and 0.03, see doc/measured/ur10e_arm.md
