@@ -46,7 +46,7 @@ bool load_travels(const TwoEncoders& motion);
 void require_possible(const TwoEncoders& motion, double inertia);
 
 /// A torque that alternates throws the motor to and fro within each sample: teeth that push but never pull,
-/// damping and dry friction then do not see the means that are recorded.
+/// damping and dry friction then do not act on the recorded means.
 void require_steady(const TwoEncoders& motion, double inertia);
 
 }  // namespace backlash::diagnosis

@@ -93,8 +93,8 @@ Readings read(const std::vector<Cut>& cuts, const std::vector<char>& worth, cons
   return out;
 }
 
-/// The play by another cut that leaves as little, the one that is farthest away beyond the errors of both;
-/// that of the surest where none is.
+/// Of the cuts that leave as little: the play that is farthest away beyond the errors of both;
+/// the surest cut's where there is none.
 double another_gap(const Readings& readings) {
   const FlankFit& surest = readings.surest();
   double gap = surest.gap, farthest = 0;
@@ -138,7 +138,7 @@ struct Law {
   Readings readings;
 };
 
-/// Median size of what a fit leaves of all windows, as a standard deviation.
+/// Median size of the residuals of all windows, as a standard deviation.
 double typical_of(const FlankFit& fit) {
   std::vector<double> away;
   for (const double a : fit.away)

@@ -204,7 +204,8 @@ void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
   VectorXd right = VectorXd::Zero(a_.cols());
   add_windows(&normal, &right);
   const double noise = sigma_ > 0 ? sigma_ : 0.1 * std::sqrt(phi_.squaredNorm() / static_cast<double>(n_));
-  // A declaration is worth one window per its own variance times what a correlated record repeats itself.
+  // A declaration counts like one window of its own variance, times how often a correlated record repeats
+  // itself.
   const double weight = noise * noise * std::max(1.0, count / 50);
   if (inertia_ > 0 && model_.inertia > 0) {
     const double precision = noise * noise / std::pow(kInertiaDeviation * model_.inertia, 2);
@@ -394,7 +395,7 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
   return fit;
 }
 
-/// Does the record hold the compliance? Then the declaration is not needed, and may be wrong.
+/// Whether the record determines the compliance: then the declaration, which may be wrong, is not needed.
 bool Fitter::holds_compliance() {
   solve(gap_, 0);
   const double free = p_[elastic_at_];

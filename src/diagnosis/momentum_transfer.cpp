@@ -170,7 +170,7 @@ double half_width(const Travels& travels, const signal::RobustScale& scale, cons
                     static_cast<double>(flank.half) * motor.interval, smear)};
   const double noisy = kNoisyTiming * smear * std::min(1.0, 2 * kNoiseFree * flank.noise / flank.level);
   const double share = std::max(s.elastic_uncertainty, motor.torque_measured ? 0 : kEstimatedElasticShare);
-  // What makes crossings of a free load differ may shift all of them.
+  // Whatever makes crossings of a free load differ may also shift all of them.
   const double unlike = s.output_locked ? 0 : scale.deviation;
   return std::sqrt(scatter * scatter + unlike * unlike + std::pow(signal::median(travels.timing), 2) +
                    noisy * noisy +
@@ -198,7 +198,7 @@ void check_friction(const Flank& flank, const MomentumTransferSettings& s) {
                     flank.level, s.motor_friction)};
 }
 
-/// Of a record, by one machine.
+/// The reading of a record by one machine.
 struct Reading {
   Flank flank;
   Travels travels;

@@ -71,7 +71,7 @@ void CrossingFit::take_rotors() {
   mobilities_ = std::make_shared<const std::vector<LinkMobilities>>(std::move(all));
 }
 
-/// Standard deviations of what is a window's own. The equations are not exact, so that each turn says another
+/// Standard deviations of a window's own values. The equations are not exact, so that each turn says another
 /// gap: without that, the turn with the hardest touch alone would decide.
 VectorXd CrossingFit::own_spread(const CrossingMachine& machine) const {
   const Index n = Index(machine.size());
@@ -214,9 +214,9 @@ double CrossingFit::shaken(std::size_t window, std::size_t joint, const Crossing
   return shaken_[window][joint] * (std::exp(2 * machine[joint][kCrossingRotor]) - 1);
 }
 
-/// Minus twice the logarithm of the likelihood of a joint's residuals in a window, whose noise is at least as
-/// large as known: a window that the equations do not explain, such as a long one with many touches, says
-/// little, and does not draw all others with it.
+/// Minus twice the log likelihood of a joint's residuals in a window, with a noise at least as
+/// large as the known one: a window that the equations do not explain, such as a long one with many touches,
+/// says little, and does not draw all others with it.
 double CrossingFit::cost_of(std::size_t window, const VectorXd& residual,
                             const CrossingMachine& machine) const {
   const Index n = residual.size() / Index(machine_.size());
@@ -228,7 +228,7 @@ double CrossingFit::cost_of(std::size_t window, const VectorXd& residual,
   return sum;
 }
 
-/// The rows of each joint by what is left of them.
+/// The rows of each joint, weighted by what is left of them.
 void CrossingFit::weigh(std::size_t window, Part& p) const {
   const Index n = p.residual.size() / Index(machine_.size());
   p.offset = VectorXd::Zero(p.global.cols());
@@ -259,7 +259,7 @@ double CrossingFit::prior_cost(const CrossingMachine& machine) const {
   return sum;
 }
 
-/// Of a window, with what is known of its own values.
+/// Cost of a window, with the priors of its own values.
 double CrossingFit::cost_of(std::size_t window, const CrossingMachine& machine, const VectorXd& own) const {
   return cost_of(window, residual(window, machine, own), machine) +
          own.cwiseQuotient(own_spread(machine)).squaredNorm();
@@ -293,7 +293,7 @@ void CrossingFit::add_priors(MatrixXd& h, VectorXd& g) const {
     }
 }
 
-/// Values that would leave their bounds stay there, and the others do not count on them.
+/// Values that would leave their bounds stay there, and the others are solved for without them.
 void CrossingFit::hold_at_bounds(MatrixXd& h, VectorXd& g) const {
   for (std::size_t j = 0; j < machine_.size(); ++j)
     for (int v = 0; v < kCrossingValues; ++v) {
@@ -331,7 +331,7 @@ CrossingFit::Reduced CrossingFit::reduced(const Part& p, const MatrixXd& known, 
   return out;
 }
 
-/// Takes a machine, with what is of each window alone moved to suit it where that helps, if it is better.
+/// Takes a machine if it is better, with each window's own values moved along where that helps.
 bool CrossingFit::take(const CrossingMachine& machine, const std::vector<Part>& parts,
                        const std::vector<Reduced>& normals) {
   VectorXd taken(Index(machine.size()) * kCrossingValues);

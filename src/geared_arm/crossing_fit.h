@@ -32,7 +32,7 @@ class CrossingFit {
   const Eigen::VectorXd& own(std::size_t window) const { return own_[window]; }
   /// Minus twice the logarithm of the likelihood of the residuals and of the deviations from what is known.
   double cost() const { return cost_; }
-  /// The same with another gap, all else but what is each window's own as it is.
+  /// The same with another gap; only each window's own values are fitted anew.
   double cost_with(std::size_t joint, double gap) const;
   /// Root of the mean square of a joint's weighted residuals that most windows do not exceed: about 1 where
   /// the equations hold.

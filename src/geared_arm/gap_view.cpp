@@ -11,7 +11,7 @@
 namespace backlash::geared_arm {
 namespace {
 
-// What of a motor's own torque (rotor, friction before the gap) nobody knows; choice: 0.2 to 2 % in simulated
+// The unknown share of a motor's own torque (rotor, friction before the gap); choice: 0.2 to 2 % in simulated
 // arms.
 constexpr double kOwnTorque = 0.01;
 
@@ -106,7 +106,7 @@ double GapViews::row_interval() const {
   return 1 / (kRowsPerCycle * arm_.rig.identification.torque_cutoff);
 }
 
-/// What a flank must be pressed with to be known for certain, where the other flank is pressed no more.
+/// The load that shows a flank for certain, where the other flank is pressed no harder.
 double GapViews::least_reach(std::size_t joint) const {
   return friction_[joint].link_coulomb / (1 - settings_.play.least_load);
 }

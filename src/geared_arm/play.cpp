@@ -123,7 +123,7 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
         -fit.between);
     return;
   }
-  // What friction behind the gap does to the deflection is in the interval, and no teeth that float.
+  // The interval covers what friction behind the gap does to the deflection: such teeth do not float.
   if (fit.residual > settings.worst_residual * std::fabs(fit.play) && fit.play > 3 * fit.error &&
       fit.residual > friction * std::fabs(fit.compliance)) {
     e.status = diagnosis::Status::ambiguous;
@@ -163,7 +163,7 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
   }
 }
 
-/// Reasons not to look at the deflection first.
+/// First the reasons not to look at the deflection.
 void answer(JointPlay& play, const Rows& rows, bool two_encoders, bool follows, double friction,
             const PlaySettings& settings) {
   diagnosis::Estimate& e = play.estimate;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSameColumn = 1e-9;  // of its size: a column that is constant has no effect
 constexpr double kPowers[] = {1, 0.9, 0.8, 0.73, 2.0 / 3, 0.6, 0.5};  // from a spring to beyond Hertz
-// By how much of itself a spring is harder at the largest load than at none.
+// Relative increase of a spring's stiffness from no load to the largest.
 constexpr double kHardening[] = {0.1, 0.2, 0.5, 1, 2, 5, 10};
 // Ratio of squares up to which a law is not ruled out: none of them is the true one exactly, and what is left
 // comes of other causes too. Choice, see the drawn arms in doc/arm.md.

@@ -40,7 +40,7 @@ std::vector<double> grid() {
   return gaps;
 }
 
-/// The rig as the record says it is: links and drives, about those of the file.
+/// The rig as fitted to the record: links and drives, with those of the file as prior.
 arm::ArmFit fitted_to(const arm::ArmRig& rig, const std::vector<arm::ArmMotion>& motions) {
   std::vector<arm::FittedMotion> all;
   for (const arm::ArmMotion& motion : motions) all.push_back({&motion, false});
@@ -68,7 +68,7 @@ std::vector<std::vector<double>> loads_of(const arm::ArmRig& rig,
   return loads;
 }
 
-/// Of the link alone, all other joints moving freely: the least over the poses of the record.
+/// Inertia of the link alone, all other joints moving freely: the least over the poses of the record.
 double least_inertia(const arm::Chain& chain, const std::vector<arm::ArmMotion>& motions, std::size_t joint) {
   double least = INFINITY;
   const auto n = Eigen::Index(chain.size());
@@ -121,7 +121,7 @@ TraverseJoint joint_of(const GearedArm& arm, const arm::ArmFit& fit, const arm::
   return t;
 }
 
-/// Why a joint cannot be looked at at all; empty: it can.
+/// Why a joint cannot be judged at all; empty: it can.
 std::string obstacle(const GearedArm& arm, const arm::ArmFit& fit, std::size_t j) {
   const GearedJoint& joint = arm.joints[j];
   if (joint.held) return "cannot tell: the joint is held: let it move";
@@ -235,12 +235,12 @@ double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Erro
                     judged.settings.law * joint.level / stiffness);
 }
 
-/// Times stiffer or softer than declared.
+/// By which factor the teeth are stiffer or softer than declared.
 double off_stiffness(const CrossingFit& fit, std::size_t k) {
   return std::exp(std::fabs(fit.machine()[k][kCrossingStiffness]));
 }
 
-/// A joint that the fit does not describe: what its teeth throw on the others is not known.
+/// A joint that the fit does not describe: the load of its teeth on the others is not known.
 bool is_strange(const CrossingFit& fit, std::size_t k, const TraverseSettings& settings) {
   return fit.misfit(k) > settings.misfit || off_stiffness(fit, k) > settings.far;
 }
@@ -267,7 +267,7 @@ void require_explained(const Judged& judged) {
                               judged.turns, s.least_turns)};
 }
 
-/// That the teeth are some that are known: else what they take for a play, or for none, means nothing.
+/// The fitted teeth must be plausible ones: else a play found with them, or none, means nothing.
 void require_teeth(const CrossingFit& fit, std::size_t k, const Judged& judged) {
   const TraverseSettings& s = judged.settings;
   const double stiffer = std::exp(fit.machine()[k][kCrossingStiffness]);
@@ -285,7 +285,7 @@ void require_teeth(const CrossingFit& fit, std::size_t k, const Judged& judged) 
                     power)};
 }
 
-/// That a play, which there is, is known well enough.
+/// A play that there is must be known well enough.
 void require_known(const CrossingFit& fit, std::size_t k, double half, double turns, const Judged& judged) {
   const TraverseSettings& s = judged.settings;
   const double gap = fit.gap(k);
@@ -409,7 +409,7 @@ std::vector<JointTraverse> traverses_of(const GearedArm& arm, const arm::ArmReco
       const TraverseJoint joint =
           joint_of(arm, fit, record, loads[j], least_inertia(chain, motions, j), j, settings);
       out[j].estimate.message = too_fast(joint, motions.front().interval);
-      // What its teeth throw on the other joints must be known, be it roughly.
+      // The load of its teeth on the other joints must be known, at least roughly.
       if (motions.front().interval * kFelt < teeth_cycle(joint)) joints.push_back(joint);
     }
     const auto looked_at = [&](const TraverseJoint& joint) {
