@@ -18,7 +18,7 @@ const char* unit_of_gap(const diagnosis::WaveformSettings& machine) {
   return machine.angular ? "rad" : "m";
 }
 
-/// What the sensor's gain came out as, as a share of torque; 0 where that is within what was known of it.
+/// By which share of the torque the sensor's gain is off; 0 where that is within its declared uncertainty.
 double torque_in_doubt(const diagnosis::WaveformSettings& declared,
                        const diagnosis::WaveformCommissioning& found) {
   const double off = std::abs(std::log(found.machine.sensor_gain / declared.sensor_gain));

@@ -21,7 +21,7 @@ std::map<std::string, signal::Measured> combine_findings(const std::vector<Findi
     declared[i] = rig_file::servo_parameter(names[i]).get(rig);
     size[i] = declared[i] != 0 ? kDeclaredUncertainty * std::fabs(declared[i]) : 1;
   }
-  // Deviations from the declared values in units of what these are uncertain by.
+  // Deviations from the declared values, in units of their uncertainties.
   Eigen::MatrixXd information = Eigen::MatrixXd::Identity(n, n);
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(n);
   struct Row {

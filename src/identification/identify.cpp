@@ -73,7 +73,7 @@ std::vector<std::string> parameter_names(const model::Rig& rig) {
   return names;
 }
 
-/// All but the first and the last take the torque for this joint's alone.
+/// All but the first and the last assume that the torque is this joint's alone.
 std::vector<Procedure> procedures_for(const model::Rig& rig) {
   if (rig.mesh.rigid) return {{"one_inertia", run_one_inertia}};
   if (rig.link_locked) return {{"locked_output", run_locked_output}};
@@ -131,7 +131,7 @@ void warn_of_asymmetry(IdentificationCase& c) {
 /// Friction of one inertia builds up over a travel after each reversal, which the noise does not know of.
 constexpr double kBuildUp = 0.005;  // simulation: of the torque
 
-/// A channel of which the machine leaves more than this share of the square, beyond noise, is not explained
+/// A channel of which the machine leaves more than this share of the squares, beyond noise, is not explained
 /// by it: its mean alone leaves 1.
 constexpr double kMostLeft = 0.5;    // choice
 constexpr double kMostNoise = 0.99;  // theory: of a square; a channel of noise alone shows nothing to explain
@@ -141,7 +141,7 @@ double left_beyond_noise(const ChannelError& c) {
   return (c.error * c.error - noise) / (1 - noise);
 }
 
-/// A machine of another kind than the rig file's has no values by this one: a fit makes them anything.
+/// A machine of another kind than the rig file's has no such values: a fit would make them arbitrary.
 void withhold_unexplained(Identification& result) {
   if (result.several) return;
   for (const auto& [name, channel] : result.channels) {

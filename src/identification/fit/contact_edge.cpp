@@ -15,7 +15,7 @@ constexpr double kEdge = 0.04;  // simulation: of the gap; what is borne out har
 constexpr double kClear =
     6;  // simulation: deviations of white noise; 4 come by chance, a real onset has 15 to 21
 
-/// Takes from the damping what it lacks at small penetration.
+/// A term that takes away the share of the damping that is missing at small penetration.
 class Onset : public model::Term {
  public:
   Onset(double damping, double distance) : damping_(damping), distance_(distance) {

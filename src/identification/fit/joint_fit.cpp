@@ -82,7 +82,7 @@ signal::AheadFunction ahead(const Unknowns& unknowns, const RecordSet& records) 
   };
 }
 
-/// A logarithm that approaches kFarthest either way.
+/// A logarithm that approaches kFarthest on either side.
 double limited(double logarithm) {
   const double most = std::log(kFarthest);
   return most * std::tanh(logarithm / most);
@@ -131,7 +131,7 @@ void add_equations(MachineFit& fit, const Machine& start) {
       fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) += std::pow(kEquations, 2);
 }
 
-/// What lies beyond noise, of what is this many times as large.
+/// The part beyond noise of a residual so many times the noise.
 double share_beyond_noise(double in_floors) {
   return std::sqrt(std::max(0.0, 1 - 1 / (in_floors * in_floors)));
 }
@@ -391,8 +391,8 @@ void allow_for_misfit(MachineFit& fit, const RecordSet& records) {
   if (fit.machine.rig.coupled || std::max(misfit.torque, misfit.deflection) <= kShowsMissingEffect) return;
   const std::vector<RecordSet::Row>& layout = records.layout();
   const Eigen::Index n = fit.fit.values.size(), rows = Eigen::Index(layout.size());
-  // Of the records and what keeps a value that they do not determine; what procedures found in the same
-  // records is no more certain.
+  // Rows of the records and of priors for values that these do not determine; what procedures found in the
+  // same records is no more certain.
   const Eigen::MatrixXd j = fit.fit.jacobian.topRows(rows + n);
   const Eigen::MatrixXd gain = signal::symmetric_inverse(j.transpose() * j) * j.topRows(rows).transpose();
   Eigen::VectorXd drawn = Eigen::VectorXd::Zero(n);

@@ -62,7 +62,7 @@ class RecordSet {
   RecordSet of_others(const std::vector<ServoData>& data) const;
 
   Eigen::VectorXd rows(const model::Rig& rig, const std::vector<Calibration>& calibrations) const;
-  /// Saves time where the rows of these are asked for next.
+  /// Simulates them together, which saves time where their rows are asked for next.
   void prepare(const std::vector<Machine>& machines) const;
 
   struct Row {
@@ -89,7 +89,7 @@ struct MachineFit {
   Eigen::VectorXd reach;        // of the errors of small values (reach.h); empty before judge_errors()
 };
 
-/// Of a positive value over its start: where its bound is reached to a hundredth.
+/// A positive value over its start at which its bound is reached to a hundredth.
 double farthest_logarithm();
 
 /// The numbers that a fit changes: parameters (of those that are positive the logarithm, relative to the
@@ -100,7 +100,7 @@ class Unknowns {
   Eigen::Index size() const { return Eigen::Index(start_.parameters.size() + per_record_ * records()); }
   Eigen::VectorXd values() const;
   Eigen::VectorXd scale() const;
-  /// Throws InvalidParameter for what is refused by the rig.
+  /// Throws InvalidParameter for values that the rig refuses.
   model::Rig rig(const Eigen::VectorXd& values) const;
   std::vector<Calibration> calibrations(const Eigen::VectorXd& values) const;
   /// One row per value: a wide prior about its start, so that what the records do not determine stays there.

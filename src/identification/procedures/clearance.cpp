@@ -108,7 +108,7 @@ signal::Extent extent_of(const Values& values, const Stretch& s) {
   return signal::extent(values, static_cast<std::size_t>(s.begin), static_cast<std::size_t>(s.end));
 }
 
-/// One passage with the contact of all.
+/// One passage, with the contact that all passages share.
 std::optional<GapPassage> measure(const Run& run, const Stretch& s, const FlankContact& contact, int push) {
   GapPassage p;
   p.time.assign(run.time.begin() + s.begin, run.time.begin() + s.end);
@@ -177,7 +177,7 @@ PassageFit fit_all(const Run& run, const std::vector<Stretch>& stretches, double
   return fit_flanks(passages, signal::quantile(lows, 0.5), signal::quantile(highs, 0.5), known);
 }
 
-/// Fits all, leaves out what does not fit, fits again.
+/// Fits all passages, leaves out those that do not fit, fits again.
 Passages fit_without_outliers(const Run& run, std::vector<Stretch> stretches, double stiffness, int push,
                               int least) {
   Passages p;

@@ -265,7 +265,7 @@ void say(GapMap& map) {
   }
 }
 
-/// From the runs what of the gap does not turn with the load.
+/// The part of the gap that does not turn with the load, from the runs.
 void take_waves_out(GapMap& map, Run& forward, Run& reverse, const GapMapSettings& settings) {
   GapWaveSettings of_waves;
   of_waves.drive = settings.drive ? &*settings.drive : nullptr;

@@ -206,7 +206,7 @@ class Search {
       waves_.back().pinion = waves_.back().load = 0;
   }
 
-  /// Of what the wave has in the values, with its columns in `a` and their sizes.
+  /// Derivative of the values over the order of the wave, from its columns in `a` and their sizes.
   VectorXd slope_over_order(const MatrixXd& a, const VectorXd& size, std::size_t wave) const {
     Eigen::ArrayXd slope = Eigen::ArrayXd::Zero(a.rows());
     for (Index c = base_.cols() + per_ * Index(wave), end = c + per_; c < end; c += 2)

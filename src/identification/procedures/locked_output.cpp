@@ -48,7 +48,7 @@ double spread(const Eigen::VectorXd& values) {
   return rms(values.array() - values.mean());
 }
 
-/// Differences over more than a step of the encoder, which hides what less changes.
+/// Differences over more than a step of the encoder, which hides smaller changes.
 signal::NonlinearOptions wide_steps() {
   signal::NonlinearOptions options;
   options.step = 0.02;
@@ -72,7 +72,7 @@ class Fit {
 
   void start();
   void refine();
-  /// Torque anew with what the terms make of the mesh as it is fitted.
+  /// The torque anew, with the terms acting on the fitted mesh.
   void take_torque(const LockedMesh& mesh) {
     whole_torque_ = signals_.torque(rig_, mesh);
     torque_ = signals_.picked(whole_torque_);
@@ -88,10 +88,10 @@ class Fit {
   Eigen::VectorXd residuals() const { return sigma_ * fit_.residuals.head(torque_.size()); }
   Eigen::VectorXd torque() const { return torque_; }
   double share_beyond(bool plus) const;
-  /// Before what the model may lack is counted.
+  /// Before the effects that the model may lack are counted.
   const signal::Measured& known_stiffness() const { return known_stiffness_; }
   const std::vector<std::string>& lacking() const { return lacking_; }
-  /// Then dry friction turns within a sample, and its mean is less than it is.
+  /// Then dry friction changes its sign within a sample, and its mean is too small.
   bool chatters() const { return signals_.chatters(model::GearTrain(rig_).motor_inertia()); }
 
  private:
@@ -136,7 +136,7 @@ Eigen::VectorXd Fit::rows(const Eigen::VectorXd& p) const {
   return out;
 }
 
-/// With these edges everything else is linear: keeps what leaves least. `linear` columns count: without the
+/// With these edges everything else is linear: keeps the best. `linear` columns count: without the
 /// last there is no offset.
 void Fit::consider(const Eigen::VectorXd& teeth, double plus, double minus, Eigen::Index linear,
                    Start& best) {
@@ -258,8 +258,8 @@ void Fit::add_timing(const Eigen::MatrixXd& white) {
   fit_.covariance += shift * shift.transpose();
 }
 
-/// Noise of speed and acceleration lessens what they make of the torque, and where the torque answers to the
-/// measured position, as in a closed loop, goes with what is left of it.
+/// Noise of speed and acceleration makes their share of the torque smaller, and where the torque answers to
+/// the measured position, as in a closed loop, goes with what is left of it.
 void Fit::add_noise_of_motion(const Eigen::MatrixXd& white) {
   const auto [acceleration, speed] = signals_.noise_of_motion();
   const double left = signals_.answer() * rms(residuals()), rows = double(torque_.size());
@@ -324,7 +324,7 @@ signal::Measured with_error(double value, double variance) {
   return {value, std::sqrt(variance)};
 }
 
-/// What terms are counted with; flanks that overlap count as no gap.
+/// The mesh that the terms act on; flanks that overlap count as no gap.
 model::Rig as_fitted(model::Rig rig, const Eigen::VectorXd& p) {
   const LockedMesh mesh = mesh_of(p);
   model::ContactSpec spec = rig.mesh.contact_spec();

@@ -52,7 +52,7 @@ Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return both;
 }
 
-/// How far x is moved by what none of the effects explains.
+/// How far x is moved by what no effect explains.
 Eigen::VectorXd unexplained(const Eigen::MatrixXd& a, double left) {
   const Eigen::MatrixXd gain = signal::symmetric_inverse(signal::gram(a));
   Eigen::VectorXd drawn(a.cols());
