@@ -29,8 +29,8 @@ std::size_t missing_after(const std::vector<double>& time, std::size_t i, double
   return around < kMissing ? 0 : std::size_t(std::lround(std::min(own - 1, around)));
 }
 
-/// The clock jumped between i and i + 1 by more than the motion did: the speed before and after, which is the
-/// same, makes the way in one interval.
+/// The clock jumped between i and i + 1 by more than the motion did: the speed before and after, being the
+/// same, covers the way in one interval.
 bool is_clock_step(const RecordLook& look, std::size_t i) {
   const std::vector<double>& t = look.record.time;
   if (i < 3 || i + 4 >= t.size()) return false;

@@ -78,7 +78,7 @@ std::string headline(const diagnosis::Verdict& v, const PageUnit& unit) {
                      four_digits(upper / unit.scale()), fmt::arg("unit", unit.name()));
 }
 
-/// What a headline leaves to be said: by which methods, and what contradicts them.
+/// What the headline does not say: by which methods, and what contradicts them.
 std::string beside_headline(const std::string& message) {
   const std::size_t by = message.find(" by ");
   return by == std::string::npos ? message : "B" + message.substr(by + 2);
@@ -146,7 +146,7 @@ std::string found_text(const rig_file::DeclaredValue& v, const diagnosis::Wavefo
   return fmt::format("{} \u00b1 {:.1g}", four_digits(e.found - v.share), e.standard_error);
 }
 
-/// The machine as its rig file declares it, and beside it as a fit found it that is believed.
+/// The machine as its rig file declares it, and beside it as a trusted fit found it.
 Json machine(const DiagnosisReport& report, const rig_file::RigFile* rig) {
   Json rows = Json::array();
   if (!rig) return rows;

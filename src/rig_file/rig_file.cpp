@@ -56,7 +56,7 @@ bool fill_contact(const model::Mesh& mesh, diagnosis::WaveformSettings& s) {
   return true;
 }
 
-/// Of a rig that the estimator's equations describe; nothing of any other.
+/// For a rig that the estimator's equations describe; nothing for any other.
 std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   const model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
   if (in.rigid || (out.rigid && rig.link_locked) || rig.mesh.rigid || rig.mesh.variation || rig.mesh.pairs ||
@@ -82,7 +82,7 @@ std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   return s;
 }
 
-/// The same. Its values at the axis of motor_position.
+/// The same, with its values at the axis of motor_position.
 std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
     const model::Rig& rig, const std::shared_ptr<const model::GearTrain>& train) {
   if (rig.link_locked || !rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.linear ||

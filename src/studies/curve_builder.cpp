@@ -104,7 +104,7 @@ Cell make_cell(const CurvePlan& plan, double backlash, const FineRun& run) {
   return cell;
 }
 
-/// What lies in the middle between two points, to learn how well the curve and its family hold there.
+/// Runs in the middle between two points, to learn how well curve and family hold there.
 struct Middle {
   std::vector<double> backlash;
   std::vector<std::vector<diagnosis::SkewnessCell>> cells;
@@ -201,7 +201,7 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   return all;
 }
 
-/// Share of the runs between the points whose interval holds their own backlash, of those that get one.
+/// Of the runs between the points that get an interval: the share whose interval contains their backlash.
 double coverage(const diagnosis::MonitoringCurve& curve, const Middle& middle) {
   int answered = 0, held = 0;
   for (std::size_t i = 0; i < middle.means.size(); ++i)
@@ -215,8 +215,8 @@ double coverage(const diagnosis::MonitoringCurve& curve, const Middle& middle) {
   return answered > 0 ? static_cast<double>(held) / answered : 1;
 }
 
-/// The smallest factor with which 95 % of the intervals hold, not below that of a normal distribution: the
-/// same runs also set the scatter.
+/// The smallest factor with which 95 % of the intervals contain the truth, not below that of a normal
+/// distribution: the same runs also set the scatter.
 double calibrated_factor(diagnosis::MonitoringCurve curve, const Middle& middle) {
   for (; curve.coverage_factor < 5; curve.coverage_factor += 0.1)
     if (coverage(curve, middle) >= 0.95) break;

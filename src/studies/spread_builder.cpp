@@ -72,7 +72,7 @@ Trial try_out(const CurvePlan& plan, const diagnosis::MonitoringCurve& curve, do
   return trial;
 }
 
-/// Each drawn machine at backlash values spread over the curve and beyond, other values each; denser where it
+/// Each drawn machine at backlash values of its own, spread over the curve and beyond; denser where backlash
 /// is small, as those alone show a lower bound above the truth.
 std::vector<Machine> machines_of(const CurvePlan& plan) {
   std::vector<Machine> machines;
@@ -85,7 +85,7 @@ std::vector<Machine> machines_of(const CurvePlan& plan) {
       machines.push_back(with_backlash(machine, kReach * plan.request.max_backlash * place));
     }
   }
-  // What sticks cannot be moved together with others.
+  // Machines that stick cannot be moved together with others.
   std::stable_partition(machines.begin(), machines.end(),
                         [](const Machine& m) { return m.rig.motor.coulomb_friction == 0; });
   return machines;
@@ -112,7 +112,7 @@ std::vector<Trial> run_trials(const CurvePlan& plan, const diagnosis::Monitoring
   return trials;
 }
 
-/// How far answers near a backlash are off: of all within `near`, and of the kFewest nearest; `all` that was
+/// How far answers near a backlash are off: all within `near`, and the kFewest nearest; `all` that were
 /// drawn where there are too few.
 void add_point(std::vector<const Trial*> answered, diagnosis::Estimate Trial::*method, double backlash,
                double near, double all, DeclaredSpread::Widening& w) {
