@@ -73,7 +73,7 @@ void expect_numbers(const std::string& cell, const Json& value, const Json& inte
     if (end.is_number()) given.push_back(end.get<double>());
   ASSERT_EQ(shown.size(), given.size()) << cell;
   for (std::size_t i = 0; i < given.size(); ++i)
-    EXPECT_NEAR(shown[i], given[i] / unit, 5.01 * std::pow(10, -digits) * std::fabs(json[i] / unit)) << cell;
+    EXPECT_NEAR(shown[i], given[i] / unit, 5.01 * std::pow(10, -digits) * std::fabs(given[i] / unit)) << cell;
 }
 
 void expect_drawn(const Json& page, std::size_t plots) {
