@@ -1,9 +1,9 @@
 #!/bin/bash
 # Checks how the files are written: the licence in the first lines of each, the layout by .clang-format, names and habits
 # by .clang-tidy, that every public header compiles alone, that rooms include only what they may know, that
-# lanes do not lie where their alignment is lost and round as one alone does, that pages lead to each other, and that
-# no word of scripts/words.txt appears.
-# Usage: bash scripts/check_style.sh [licence|format|tidy|headers|rooms|lanes|pages|words]... [--all|--since COMMIT]
+# lanes do not lie where their alignment is lost and round as one alone does, that pages lead to each other, that no word
+# of scripts/words.txt appears, and the form of messages.
+# Usage: bash scripts/check_style.sh [licence|format|tidy|headers|rooms|lanes|pages|words|messages]... [--all|--since COMMIT]
 #   tidy and headers look at the files that differ from the main branch (on it: from the commit before), --all at all.
 #   format and tidy are those of clang 14 and are not tried with another; exit code 77 where that leaves nothing to do.
 # SPDX-License-Identifier: BSD-3-Clause
@@ -112,12 +112,16 @@ words() {
   python3 scripts/check_words.py
 }
 
+messages() {
+  python3 scripts/check_messages.py
+}
+
 parts=()
 all=0
 since=
 while (($#)); do
   case $1 in
-    licence | format | tidy | headers | rooms | lanes | pages | words) parts+=("$1") ;;
+    licence | format | tidy | headers | rooms | lanes | pages | words | messages) parts+=("$1") ;;
     --all) all=1 ;;
     --since) since=${2:?} && shift ;;
     *)
@@ -128,7 +132,7 @@ while (($#)); do
   esac
   shift
 done
-((${#parts[@]})) || parts=(licence format tidy headers rooms lanes pages words)
+((${#parts[@]})) || parts=(licence format tidy headers rooms lanes pages words messages)
 
 cd "${REPO}"
 failed=0

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Of the search for changes what is about the part of a record that no effect explains.
+// The part of the search for changes that deals with what no effect explains.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@ namespace backlash::changes {
 
 bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
   if (all.empty()) return !like_fault_;
-  // So many at once are rather one of another shape.
+  // So many at once are rather one change of another shape.
   if (all.size() >= static_cast<std::size_t>(settings_.most_changes)) return false;
   std::size_t from = blocks_;
   for (const FoundChange& f : all) from = std::min(from, f.from);
@@ -33,7 +33,7 @@ std::vector<double> ChangeSearch::squares_over_healthy(const std::vector<FoundCh
   const Background b = background(all);
   const Eigen::VectorXd left = b.left();
   Eigen::VectorXd expected = expected_squares(model_, motion_);
-  // What stands beside is as well known as its shape.
+  // What was found before is known only as well as its shape.
   const Eigen::VectorXd beside = b.columns.middleCols(beside_column_, beside_columns_) *
                                  b.estimate.segment(beside_column_, beside_columns_);
   expected += (settings_.model_error * beside).cwiseAbs2();

@@ -48,14 +48,14 @@ void drop(RecordLook& look, Channel channel) {
   look.record.column(channel).clear();
 }
 
-/// rad at the load: farther than that one side does not move while the other stands.
+/// rad at the load: the farthest that one side moves while the other stands.
 double loosest(const RecordLook& look) {
   if (!look.declared.looseness) return 0;
   return kLooserThanDeclared *
          look.declared.looseness(look.declared.axis_ratio * travel_of(look.record, Channel::motor_torque));
 }
 
-/// The channel is of one value. What follows depends on what the others do.
+/// The channel has one value throughout. What follows depends on the other channels.
 void say_dead(RecordLook& look, Channel channel) {
   const Record& r = look.record;
   const double value = r.column(channel).front() + 0.0, motor = travel_of(r, Channel::motor_position);
@@ -114,7 +114,7 @@ void say_dead(RecordLook& look, Channel channel) {
   }
 }
 
-/// A load whose position was computed from the motor's shows no play, whatever there is.
+/// A load position that was computed from the motor's shows no play, however much there is.
 void look_for_copy(RecordLook& look) {
   const std::vector<double>&motor = look.record.column(Channel::motor_position),
         &load = look.record.column(Channel::load_position);

@@ -53,7 +53,7 @@ double held_while_moving(const std::vector<double>& x, double step) {
   return fresh + held < kFewestMoving ? 0 : double(held) / double(fresh + held);
 }
 
-/// The same of a torque, whose values repeat by rights where it is switched or rounded: here each lasts
+/// The same of a torque, whose values may well repeat where it is switched or rounded: held, each lasts
 /// equally long.
 double held_regularly(const std::vector<double>& x) {
   const std::vector<Run> runs = runs_of(x, 1);
@@ -118,7 +118,7 @@ Follow follow_of(const std::vector<double>& x, const std::vector<double>& y, con
   return follow;
 }
 
-/// x stands still while y, which it follows elsewhere, goes farther than the two are ever apart.
+/// x stands still while y, which it follows elsewhere, moves farther than the two are ever apart.
 void look_at_frozen(RecordLook& look, Channel channel, const std::vector<double>& y,
                     const std::string& other) {
   const std::vector<double>& x = look.record.column(channel);
@@ -134,7 +134,7 @@ void look_at_frozen(RecordLook& look, Channel channel, const std::vector<double>
   }
 }
 
-/// A torque that is noisy elsewhere repeats no value so often but where it is limited or switched off.
+/// A torque that is noisy elsewhere repeats a value that often only where it is limited or switched off.
 void look_at_frozen_torque(RecordLook& look, const ChannelState& state) {
   const std::vector<double>& x = look.record.column(state.channel);
   if (!(state.noise > kMoves * signal::smallest_step(x))) return;

@@ -26,7 +26,7 @@ double contact_value(const model::Rig& rig, const char* name) {
   [](const model::Rig& rig) { return contact_value(rig, name); }, \
       [](model::Rig& rig, double value) { set_contact(rig, name, value); }
 
-/// Of one part, in this order: unlike a body's, the parameters of a mesh are no affair of the reduction.
+/// Of one part, in this order: unlike a body's, the parameters of a mesh do not change with the reduction.
 std::vector<RigParameter> inertias_and_mesh() {
   return {
       {"motor_inertia", RigPart::motor, Kind::inertia, "kg m^2", "gear_train.motor.inertia",

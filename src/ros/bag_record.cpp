@@ -207,7 +207,7 @@ class Reader {
   }
 
  private:
-  /// What is damaged is told before what is missing, which may be missing for that.
+  /// Damage is reported before what is missing: it may be the cause.
   template <typename Read>
   record::Record of_sound_file(const Read& read) {
     try {
@@ -233,7 +233,7 @@ class Reader {
     for (std::size_t i = 0; i < topics.size(); ++i) meet(map.on(map.topics()[i]), topics[i]);
     mapped_ = true;
     read_messages(topics);
-    return told(joined_parts(map, topics));
+    return with_warnings(joined_parts(map, topics));
   }
 
   /// By the names of this package.
@@ -247,7 +247,7 @@ class Reader {
   record::Record finished(const std::vector<std::string>& topics) {
     JointRun& run = chosen(topics);
     if (run.wrong) std::rethrow_exception(run.wrong);
-    return told(run.finished());
+    return with_warnings(run.finished());
   }
 
   bool any_has(const std::string& name) const {
@@ -255,7 +255,7 @@ class Reader {
                        [&name](const auto& topic) { return topic.second.names.count(name) > 0; });
   }
 
-  record::Record told(record::Record record) const {
+  record::Record with_warnings(record::Record record) const {
     for (std::string& warning : source_->warnings()) record.warnings.push_back(std::move(warning));
     return record;
   }

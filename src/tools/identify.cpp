@@ -49,7 +49,7 @@ Command command() {
       "A rig with two inertias (rigid couplings, free link) is identified from motor_torque, motor_position "
       "and load_position; one "
       "inertia (mesh: rigid) and a locked output (link: locked) from motor_torque and motor_position. More "
-      "runs tell more: constant speeds both "
+      "runs identify more: constant speeds both "
       "ways (friction, gap "
       "over position), sine about a speed (inertia), sweep with bias (frequency response), square wave "
       "(damping), load moved by "

@@ -57,7 +57,7 @@ Command command() {
   c.exit_codes =
       "  0   done: nothing is missing, or the effects that are were found and added\n"
       "  3   something is missing that no effect explains, be it beside effects that were found; or the "
-      "records do not tell the machine (report.json says why)\n";
+      "records do not determine the machine (report.json says why)\n";
   return c;
 }
 

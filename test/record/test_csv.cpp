@@ -89,7 +89,7 @@ TEST(Csv, HarmlessVariationsReadTheSame) {
   }
 }
 
-TEST(Csv, OneSampleAndAnyTellingChannelIsEnough) {
+TEST(Csv, OneSampleAndAnyChannelOfMotionIsEnough) {
   for (const char* channel : {"motor_torque", "sensor_torque", "motor_position", "load_position",
                               "motor_current", "acceleration", "output_torque"}) {
     EXPECT_EQ(parse("time," + std::string(channel) + "\n0,1\n").column(channel_from_name(channel)).size(),
@@ -211,7 +211,7 @@ TEST(Csv, RepeatedStampsLoseTheLaterRowWithOneWarning) {
             "3 repeated time stamps: the later sample dropped; first at line 4, time = 1 s");
 }
 
-TEST(Csv, GapsAndJitterAreTold) {
+TEST(Csv, GapsAndJitterAreReported) {
   const Record gap = parse(kHeader + "0,1\n1,1\n2,1\n3,1\n33,1\n34,1\n");
   EXPECT_EQ(
       gap.warnings,

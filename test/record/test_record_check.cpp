@@ -122,7 +122,7 @@ TEST(RecordCheck, ACounterOfRepeatedStampsIsPassedOn) {
 }
 
 // The motion goes on by one sample while the stamps go on by half a second.
-TEST(RecordCheck, TellsAStepOfTheClockFromLostSamples) {
+TEST(RecordCheck, DistinguishesAStepOfTheClockFromLostSamples) {
   const auto stamped = [](int k) { return k * kInterval + (k > 5000 ? 0.5 : 0); };
   const CheckedRecord checked = check_record(recorded([](int k) { return k * kInterval; }, stamped), servo());
   const Finding* const step = find(checked.check, FindingKind::clock_step);
@@ -141,7 +141,7 @@ std::vector<double> jitter(double share) {
   return out;
 }
 
-TEST(RecordCheck, TellsStampsThatJitterFromSamplesThatAreLate) {
+TEST(RecordCheck, DistinguishesStampsThatJitterFromSamplesThatAreLate) {
   const std::vector<double> late = jitter(0.2);
   const auto even = [](int k) { return k * kInterval; };
   const auto uneven = [&](int k) { return k * kInterval + late[std::size_t(k)]; };

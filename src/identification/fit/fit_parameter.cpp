@@ -47,7 +47,7 @@ FitParameter term_parameter(std::size_t term, const std::string& name, const mod
   const std::string id = rig.terms.at(term)->id;
   for (const ParameterSpec& spec : model::term_type(id).parameters) {
     if (spec.name != name) continue;
-    // A step of the fit beyond what the term can be is one to its bound.
+    // A step of the fit beyond the range of the term goes to its bound.
     const auto set = [term, name, most = spec.range.upper](model::Rig& changed, double value) {
       ParameterValues values = changed.terms[term]->values;
       values[name] = std::min(value, most);

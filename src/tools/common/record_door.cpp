@@ -13,7 +13,7 @@
 namespace backlash::tools {
 namespace {
 
-constexpr double kWorthwhile = 0.5;  // choice: of the longest stretch; shorter ones tell little beside it
+constexpr double kWorthwhile = 0.5;  // choice: of the longest stretch; shorter ones add little to it
 
 void refuse_if(const report::CheckedFile& file) {
   for (const record::Finding& finding : file.findings())
