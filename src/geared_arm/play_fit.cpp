@@ -18,7 +18,7 @@ constexpr double kPowers[] = {1, 0.9, 0.8, 0.73, 2.0 / 3, 0.6, 0.5};  // from a 
 // Relative increase of a spring's stiffness from no load to the largest.
 constexpr double kHardening[] = {0.1, 0.2, 0.5, 1, 2, 5, 10};
 // Ratio of squares up to which a law is not ruled out: none of them is the true one exactly, and what is left
-// comes of other causes too. Choice, see the drawn arms in doc/arm.md.
+// comes of other causes too. Choice, see the drawn arms in doc/evidence/arm.md.
 constexpr double kSameLaw = 1.5;
 constexpr double kLawErrors = 3;      // standard errors by which the record distinguishes two laws: choice
 constexpr double kOutOfCentre = 0.8;  // of the squares, which an encoder's errors must leave: choice

@@ -66,7 +66,7 @@ std::vector<std::string> parameter_names(const model::Rig& rig) {
   std::vector<std::string> names;
   for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     if (p.kind == rig_file::ParameterKind::start_in_gap) continue;
-    if (rig.coupled && !rig_file::told_by_deflection(p)) continue;
+    if (rig.coupled && !rig_file::shown_by_deflection(p)) continue;
     const bool skew = p.kind == rig_file::ParameterKind::encoder_skew && p.known_to(rig);
     if (p.get(rig) != 0 || skew) names.push_back(p.name);
   }
@@ -154,7 +154,7 @@ void withhold_unexplained(Identification& result) {
     result.unexplained = result.unexplained ? *result.unexplained + ". " + reason : reason;
     for (auto& [parameter, measured] : result.parameters) {
       const bool shown = name == "torque" || result.one_inertia ||
-                         rig_file::told_by_deflection(rig_file::servo_parameter(parameter));
+                         rig_file::shown_by_deflection(rig_file::servo_parameter(parameter));
       if (shown) measured.standard_error = std::numeric_limits<double>::infinity();
     }
   }

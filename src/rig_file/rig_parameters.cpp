@@ -106,7 +106,7 @@ const RigParameter& servo_parameter(RigPart part, ParameterKind kind) {
   throw InvalidParameter("parameter", "of this part and kind", "is not one of a servo with two inertias");
 }
 
-bool told_by_deflection(const RigParameter& p) {
+bool shown_by_deflection(const RigParameter& p) {
   const bool dry = p.part == RigPart::motor && p.kind == Kind::coulomb_friction && !p.is_asymmetry();
   return p.kind == Kind::encoder_skew || p.kind == Kind::stiffness || dry;
 }

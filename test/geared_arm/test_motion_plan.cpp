@@ -390,7 +390,7 @@ TEST(MotionPlan, ShowsThePlaysThatTheMotionOfTheFileHides) {
     ASSERT_EQ(e.status, diagnosis::Status::ok) << e.message;
     EXPECT_LE(e.angle_lower, truth[j]);
     EXPECT_GE(e.angle_upper, truth[j]);
-    EXPECT_NEAR(e.backlash_angle, truth[j], 0.1 * truth[j]);  // the promise of doc/arm.md
+    EXPECT_NEAR(e.backlash_angle, truth[j], 0.1 * truth[j]);  // within 10 %, as in doc/evidence/arm.md
     // As many stays as were promised in each of the two periods, at least.
     EXPECT_GE(plays[j].stays[0], 2 * plan.joints[j].stays[0]);
     EXPECT_GE(plays[j].stays[1], 2 * plan.joints[j].stays[1]);

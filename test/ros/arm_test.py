@@ -165,7 +165,7 @@ class ArmTest(unittest.TestCase):
             verdict = joints[joint]["verdict"]
             lower, upper = verdict["angle_interval"]
             self.assertTrue(lower <= PLAY[joint] <= upper, verdict)
-            self.assertLess(upper - lower, 0.1 * PLAY[joint])  # as doc/arm.md says: 5 %
+            self.assertLess(upper - lower, 0.1 * PLAY[joint])  # twice the width that doc/arm.md shows
             self.assertLessEqual(abs(verdict["backlash_angle"] - PLAY[joint]), 0.05 * PLAY[joint])
 
     def test_a_joint_takes_its_torque_from_its_topic_and_its_backlash_from_its_service(self):

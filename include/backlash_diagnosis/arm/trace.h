@@ -34,14 +34,14 @@ struct ArmTraceSettings {
                                 // even where the training records leave it too; choice: measured healthy arms
                                 // leave up to 0.055, and up to 9.2 times their noise
   double explained = 2;  // the same, of a joint whose friction, or whose motor's torque, an effect scales by
-                         // a factor: more is left by what is no factor; choice, see doc/arm.md
+                         // a factor: more is left by what is no factor; choice, see doc/evidence/arm.md
   int most_effects = 3;  // of single joints; choice
   int most_tried = 3;    // guesses for each; choice (time)
   double least_at_joint = 0.5;  // share of its joint's squared error that such an effect must take away, and
   double least_of_signal = 0.025;  // rms of what it explains, of the signal's deviation; choice: bristles of
                                    // a UR10e's joints take up to 0.4 and 0.03, see doc/measured/ur10e_arm.md
   double law = 0.03;  // of the size of an effect of a joint: its law is not the machine's; choice, tried on
-                      // drawn arms, see doc/arm.md
+                      // drawn arms, see doc/evidence/arm.md
   double of_left = 0.5;  // of what its joint is left with beyond what is expected, that may have its shape;
                          // choice, tried on drawn arms
   double clearly = 0.1;  // share of the squared error by which an effect of the test record alone must do

@@ -48,7 +48,7 @@ namespace backlash::geared_arm {
 struct TraverseSettings {
   double least_load = 0.1;    // of the largest |T|, beyond friction: below it the flank is not certain; as
                               // geared_arm/play.h
-  double model = 0.05;        // of the play; choice, see the study in doc/arm.md
+  double model = 0.05;        // of the play; choice, see the study in doc/evidence/arm.md
   double law = 0.13;          // of the deflection under the usual load; choice: teeth by no power
   double disagreement = 0.1;  // of the torque of the joint (rms) that the fitted chain may leave; choice
   double friction = 2;   // Coulomb's of the motor, that the load must reach on both flanks: what a bristle

@@ -29,7 +29,7 @@ std::vector<std::function<double(const model::Rig&)>> rows_as_declared(const mod
   std::vector<std::function<double(const model::Rig&)>> rows;
   for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     const double value = p.get(declared);
-    if (!rig_file::told_by_deflection(p) || !p.positive() || !(value > 0)) continue;
+    if (!rig_file::shown_by_deflection(p) || !p.positive() || !(value > 0)) continue;
     if (p.kind == rig_file::ParameterKind::stiffness) {
       rows.emplace_back([get = p.get, value](const model::Rig& rig) {
         return std::log(get(rig) / value) / std::log(kDeclaredStiffness);
