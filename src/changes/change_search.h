@@ -57,7 +57,9 @@ class ChangeSearch {
 
  private:
   std::vector<double> times() const;
-  std::vector<double> squares_over_healthy(const std::vector<FoundChange>& all) const;
+  /// `apart`: what is left there is of another variance, and determines the values of the rest as little.
+  std::vector<double> squares_over_healthy(const std::vector<FoundChange>& all,
+                                           const std::optional<LoudStretch>& apart = std::nullopt) const;
   Eigen::MatrixXd found_columns(const FoundChange& f) const;
   std::optional<FoundChange> best(const Background& b) const;
   bool leaves_more(const FoundChange& f, const FoundChange& most, const Background& b) const;

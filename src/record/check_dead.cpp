@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/record/numbers.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "check_parts.h"
 
@@ -39,9 +40,12 @@ void look_for_numbers(RecordLook& look, Channel channel) {
   if (count == 0) return;
   const std::string& name = channel_name(channel);
   look.say(FindingKind::not_finite, name, look.record.time[first], look.record.time[last], count,
-           Consequence::noted,
-           fmt::format("{}: no number in {}, the first at {:.6g} s: estimates that need it refuse the record",
-                       name, counted(count, "sample"), look.record.time[first]));
+           Consequence::mended,
+           fmt::format("{}: no number in {}, the first at {:.6g} s: {}", name, counted(count, "sample"),
+                       look.record.time[first],
+                       double(x.size() - count) < kHardlyRecorded * double(x.size())
+                           ? "taken as absent"
+                           : "they count as lost samples"));
 }
 
 void drop(RecordLook& look, Channel channel) {
@@ -144,6 +148,7 @@ void check_dead(RecordLook& look) {
     const double first = look.record.column(channel).front();
     if (std::isfinite(first) && !(travel_of(look.record, channel) > 0)) say_dead(look, channel);
   }
+  if (!look.declared.shares_stamps) keep_rows_with_numbers({&look.record});
   look_for_copy(look);
 }
 
