@@ -55,9 +55,9 @@ std::vector<std::shared_ptr<const model::Term>> directions(const model::Term& te
 
 }  // namespace
 
-Balance::Balance(const Machine& machine, const std::vector<ServoData>& data, double cutoff)
+Balance::Balance(const Machine& machine, const std::vector<ServoData>& data, const Cutoffs& cutoffs)
     : rig_(machine.rig),
-      cutoff_(cutoff),
+      cutoffs_(cutoffs),
       load_inertia_(model::GearTrain(machine.rig).load_inertia()),
       stiffness_(rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness)
                      .get(machine.rig)) {
@@ -113,9 +113,9 @@ void Balance::scale(const Eigen::VectorXd& signal) {
 }
 
 Balance::Part Balance::part_of(const ServoData& data, const Calibration& calibration) const {
-  const PreparedServo prepared(data, cutoff_, 0);
+  const PreparedServo prepared(data, cutoffs_.torque, 0);
   const std::vector<double> acceleration =
-      signal::low_pass(signal::derivative(data.load_rate, data.interval), data.interval, cutoff_);
+      signal::low_pass(signal::derivative(data.load_rate, data.interval), data.interval, cutoffs_.deflection);
   std::vector<double> through(data.size()), slides(data.size()), pressed(data.size());
   for (std::size_t k = 0; k < data.size(); ++k)
     through[k] = load_inertia_ * acceleration[k] + rig_.link.viscous_damping * data.load_rate[k] +
@@ -134,8 +134,8 @@ Balance::Part Balance::part_of(const ServoData& data, const Calibration& calibra
     if (!data.lost.empty() && data.lost[k]) slides[k] = pressed[k] = 0;
     part.samples.push_back(s);
   }
-  part.torque_rows = rows_where(slides, data.interval, cutoff_);
-  part.deflection_rows = rows_where(pressed, data.interval, cutoff_);
+  part.torque_rows = rows_where(slides, data.interval, cutoffs_.torque);
+  part.deflection_rows = rows_where(pressed, data.interval, cutoffs_.deflection);
   return part;
 }
 
@@ -178,8 +178,9 @@ Eigen::VectorXd Balance::rows(const std::vector<Sums>& of_parts) const {
   Eigen::Index next = 0;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const Part& part = parts_[i];
-    const std::vector<double> torque = signal::low_pass(of_parts[i].torque, part.interval, cutoff_),
-                              deflection = signal::low_pass(of_parts[i].deflection, part.interval, cutoff_);
+    const std::vector<double> torque = signal::low_pass(of_parts[i].torque, part.interval, cutoffs_.torque),
+                              deflection = signal::low_pass(of_parts[i].deflection, part.interval,
+                                                            cutoffs_.deflection);
     for (const std::size_t k : part.torque_rows) all[next++] = torque[k];
     for (const std::size_t k : part.deflection_rows) all[next++] = deflection[k];
   }
@@ -196,7 +197,7 @@ Eigen::VectorXd Balance::measured(const Machine& machine, const std::vector<Serv
   std::vector<Sums> all;
   for (std::size_t i = 0; i < data.size(); ++i) {
     Sums sums;
-    sums.torque = PreparedServo(data[i], cutoff_, 0).acting_torque(rig_, machine.calibrations[i]);
+    sums.torque = PreparedServo(data[i], cutoffs_.torque, 0).acting_torque(rig_, machine.calibrations[i]);
     for (std::size_t k = 0; k < data[i].size(); ++k)
       sums.deflection.push_back(data[i].motor[k] - data[i].load[k]);
     all.push_back(std::move(sums));

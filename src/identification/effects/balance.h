@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What two encoders show of a geared machine without a simulation of its teeth: two sums, linear in all that
-// is sought, below the mesh resonance.
+// is sought.
 //   whole train     tau = J_M a_M + J_L a_L + b w_M + F s_M - terms on either end
 //   pressed flank   q_M - q_L = zero + side g / 2 + T / k + skew w_L + shift of the flank by terms
 // s_M = +-1 is the direction of the motor; T = J_L a_L + b_L w_L + F_L s_M, with the values of a fit, is what
@@ -19,9 +19,13 @@ namespace backlash::identification {
 
 class Balance {
  public:
-  /// Of the machine with its terms. `data`: its records, which must outlive this. `cutoff` [Hz]: of the
-  /// low-pass of both sums.
-  Balance(const Machine& machine, const std::vector<ServoData>& data, double cutoff);
+  /// Of the low-pass of each sum [Hz]. The first holds at any frequency, the second where the teeth are a
+  /// spring.
+  struct Cutoffs {
+    double torque, deflection;
+  };
+  /// Of the machine with its terms. `data`: its records, which must outlive this.
+  Balance(const Machine& machine, const std::vector<ServoData>& data, const Cutoffs& cutoffs);
 
   /// Measured minus what the machine's values and the strengths of its terms can explain, each channel in
   /// units of its standard deviation.
@@ -70,7 +74,7 @@ class Balance {
                      const Eigen::VectorXd& factors) const;
 
   const model::Rig rig_;
-  const double cutoff_;
+  const Cutoffs cutoffs_;
   double load_inertia_, stiffness_;
   std::vector<Part> parts_;
   std::vector<char> deflection_;  // of each row, whether it is one

@@ -29,7 +29,8 @@ std::size_t unknowns(const Candidate& c) {
 std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& context) {
   const SearchSettings& settings = context.settings;
   const AcceptanceSettings& acceptance = settings.acceptance;
-  const Balance balance(h.fitted->fit.machine, context.data, settings.fit.rough_cutoff);
+  const Balance balance(h.fitted->fit.machine, context.data,
+                        {settings.fit.cutoff, settings.fit.rough_cutoff});
   const auto column = [&](const model::Term& term) { return balance.column(term, settings.screen.telling); };
   std::vector<Plain> all;
   const MachineFit& fit = h.fitted->fit;
@@ -114,7 +115,10 @@ Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context) {
   const std::vector<Plain> plain = plain_candidates(h, context);
   if (plain.empty()) return h;
   const auto with = with_best(h, plain, context);
-  return with && size(*with) < size(h) ? with_best_shapes(*with, context) : h;
+  const auto left = [&](const Hypothesis& of) {
+    return plain.front().explained.deflection ? misfit(of).deflection : misfit(of).torque;
+  };
+  return with && left(*with) < left(h) ? with_best_shapes(*with, context) : h;
 }
 
 }  // namespace backlash::identification

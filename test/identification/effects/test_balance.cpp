@@ -35,7 +35,7 @@ struct Shown {
     data = {servo_data(record, machine.rig)};
   }
   Balance::Explained gain(const std::vector<std::shared_ptr<const model::Term>>& terms) const {
-    const Balance balance(machine, data, kCutoff);
+    const Balance balance(machine, data, {kCutoff, kCutoff});
     Eigen::MatrixXd columns(balance.left().size(), Eigen::Index(terms.size()));
     for (std::size_t i = 0; i < terms.size(); ++i)
       columns.col(Eigen::Index(i)) = balance.column(*terms[i], kStrength);
@@ -84,7 +84,7 @@ TEST(Balance, ShowsNothingWhereNothingIsMissing) {
 // The sign: of a friction that the machine has too little of, left() wants more.
 TEST(Balance, AColumnIsTheChangeOfWhatIsLeft) {
   const Shown shown({friction("asymmetric_coulomb", {{"torque", 12}})});
-  const Balance balance(shown.machine, shown.data, kCutoff);
+  const Balance balance(shown.machine, shown.data, {kCutoff, kCutoff});
   const Eigen::VectorXd column = balance.column(*friction("asymmetric_coulomb", {{"torque", 12}}), kStrength);
   // With the whole effect what is left is what is left of a healthy machine: a tenth of it at most.
   EXPECT_LT((balance.left() + column).squaredNorm(), balance.left().squaredNorm());
