@@ -27,6 +27,22 @@ namespace {
 constexpr double kMostShared = 0.1;  // choice: of the test record, in a training record
 constexpr double kMostNoise = 0.5;   // choice: of the deviation of the torque of the test record
 
+std::string described(const FoundEffect& effect, const model::Rig& rig) {
+  std::string text = effect.id;
+  for (const EffectParameter& p : effect.parameters)
+    text += fmt::format(", {} {:.3g} +- {:.2g} {}", p.name, p.measured.value, p.measured.standard_error,
+                        model::axis_unit(p.unit, rig.linear));
+  return text;
+}
+
+/// Is in the model, and not called missing.
+void note_instead(std::vector<FoundEffect>::iterator at, const std::string& note, const std::string& reason,
+                  Trace& trace) {
+  trace.notes.push_back(note);
+  trace.rejected.push_back({at->id, reason + ", see the notes"});
+  trace.steps.erase(at);
+}
+
 /// Every friction builds up over some path; it is called missing only where that shows.
 void note_shape_of_friction(const Hypothesis& h, double least, Trace& trace) {
   const auto at = std::find_if(trace.steps.begin(), trace.steps.end(),
@@ -34,15 +50,11 @@ void note_shape_of_friction(const Hypothesis& h, double least, Trace& trace) {
   if (at == trace.steps.end()) return;
   const double share = share_of_signal(h, at->id);
   if (share >= least) return;
-  std::string note = "friction builds up after each reversal (" + at->id;
-  for (const EffectParameter& p : at->parameters)
-    note += fmt::format(", {} {:.3g} +- {:.2g} {}", p.name, p.measured.value, p.measured.standard_error,
-                        model::axis_unit(p.unit, trace.augmented.linear));
-  note += fmt::format("): {:.2g} % of the {}, so it is in the model but not called missing", 100 * share,
-                      at->channel);
-  trace.notes.push_back(note);
-  trace.rejected.push_back({at->id, "too small to be called missing, see the notes"});
-  trace.steps.erase(at);
+  note_instead(at,
+               fmt::format("friction builds up after each reversal ({}): {:.2g} % of the {}, so it is in the "
+                           "model but not called missing",
+                           described(*at, trace.augmented), 100 * share, at->channel),
+               "too small to be called missing", trace);
 }
 
 /// What every machine has some of is in the model, and called missing only where it is more than usual.
@@ -52,14 +64,10 @@ void note_usual_effects(const Hypothesis& h, Trace& trace) {
     const auto at = std::find_if(trace.steps.begin(), trace.steps.end(),
                                  [&](const FoundEffect& e) { return e.id == effect.candidate.id; });
     if (at == trace.steps.end() || !is_usual(effect.candidate, h.declared->rig)) continue;
-    std::string note = at->id + " (";
-    for (const EffectParameter& p : at->parameters)
-      note += fmt::format("{}{} {:.3g} +- {:.2g} {}", &p == &at->parameters.front() ? "" : ", ", p.name,
-                          p.measured.value, p.measured.standard_error,
-                          model::axis_unit(p.unit, trace.augmented.linear));
-    trace.notes.push_back(note + ") is in the model but not called missing: every machine has as much");
-    trace.rejected.push_back({at->id, "no more than every machine has, see the notes"});
-    trace.steps.erase(at);
+    note_instead(at,
+                 described(*at, trace.augmented) +
+                     ": in the model but not called missing, as every machine has as much",
+                 "no more than every machine has", trace);
   }
 }
 
