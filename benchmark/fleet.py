@@ -79,9 +79,9 @@ def fleet(options, records, out):
     memory.start()
     process.wait()
     seconds = time.monotonic() - start
-    told = json.loads((out / "fleet.json").read_text())
-    if told["records"]["by_status"] != {"done": options.records}:
-        raise RuntimeError(told["records"])
+    result = json.loads((out / "fleet.json").read_text())
+    if result["records"]["by_status"] != {"done": options.records}:
+        raise RuntimeError(result["records"])
     return seconds, memory.seen
 
 

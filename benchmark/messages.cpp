@@ -6,7 +6,7 @@
 //   [Hz] of
 //       them per second of stamps and of wall time (RATE < 0: as fast as they are taken, stamps at -RATE),
 //       and prints as JSON the seconds until the subscriber of process PID has handled the last and its CPU
-//       seconds until then. That it has is told by amplitude_distribution (a period is complete) or by
+//       seconds until then. Its end is marked by amplitude_distribution (a period is complete) or by
 //       bare_done.
 //   messages bare COUNT      subscribes with an empty callback; one bare_done when COUNT have come
 //   messages latency         subscribes; when stopped prints as JSON how late samples came after their stamps

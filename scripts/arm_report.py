@@ -23,7 +23,7 @@ def joint_figure(series, joint, found):
     """What the drive gave and what both models say; below it what they leave."""
     time = np.array(series["time"], float)
     measured, before, after = (np.array(joint[key], float) for key in ("measured", "before", "after"))
-    if not np.isfinite(before).any():  # a joint at rest: nothing foretells it
+    if not np.isfinite(before).any():  # a joint at rest: nothing predicts it
         figure, above = plt.subplots(figsize=plotting.PAGE_FIGURE, layout="constrained")
         above.plot(time, measured, "-", color=MEASURED, linewidth=0.8)
         for event in series["events"]:

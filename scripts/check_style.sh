@@ -1,8 +1,9 @@
 #!/bin/bash
 # Checks how the files are written: the licence in the first lines of each, the layout by .clang-format, names and habits
 # by .clang-tidy, that every public header compiles alone, that rooms include only what they may know, that
-# lanes do not lie where their alignment is lost and round as one alone does, that pages lead to each other.
-# Usage: bash scripts/check_style.sh [licence|format|tidy|headers|rooms|lanes|pages]... [--all|--since COMMIT]
+# lanes do not lie where their alignment is lost and round as one alone does, that pages lead to each other, that no word
+# of scripts/words.txt appears, and the form of messages.
+# Usage: bash scripts/check_style.sh [licence|format|tidy|headers|rooms|lanes|pages|words|messages]... [--all|--since COMMIT]
 #   tidy and headers look at the files that differ from the main branch (on it: from the commit before), --all at all.
 #   format and tidy are those of clang 14 and are not tried with another; exit code 77 where that leaves nothing to do.
 # SPDX-License-Identifier: BSD-3-Clause
@@ -107,23 +108,31 @@ pages() {
   python3 scripts/check_pages.py
 }
 
+words() {
+  python3 scripts/check_words.py
+}
+
+messages() {
+  python3 scripts/check_messages.py
+}
+
 parts=()
 all=0
 since=
 while (($#)); do
   case $1 in
-    licence | format | tidy | headers | rooms | lanes | pages) parts+=("$1") ;;
+    licence | format | tidy | headers | rooms | lanes | pages | words | messages) parts+=("$1") ;;
     --all) all=1 ;;
     --since) since=${2:?} && shift ;;
     *)
-      sed -n '2,7s/^# //p' "$0"
+      sed -n '2,8s/^# //p' "$0"
       [[ $1 == -h || $1 == --help ]] && exit 0
       exit 64
       ;;
   esac
   shift
 done
-((${#parts[@]})) || parts=(licence format tidy headers rooms lanes pages)
+((${#parts[@]})) || parts=(licence format tidy headers rooms lanes pages words messages)
 
 cd "${REPO}"
 failed=0

@@ -1,6 +1,6 @@
 #!/bin/bash
 # Builds the package if need be and counts how often the 95 % intervals of identify and trace_residual hold, on simulated
-# machines whose truth is known (doc/reference/coverage.md). Usage: bash scripts/coverage.sh [OUT] (default: build/coverage;
+# machines whose truth is known (doc/evidence/identify.md). Usage: bash scripts/coverage.sh [OUT] (default: build/coverage;
 # an hour)
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail

@@ -14,7 +14,7 @@ import plotting  # noqa: E402
 plt = plotting.page_pyplot()
 import matplotlib.dates  # noqa: E402
 
-TOLD, CHANGE, SILENT = "#1f6fb4", "#b3261e", "#9aa7b5"
+KNOWN, CHANGE, SILENT = "#1f6fb4", "#b3261e", "#9aa7b5"
 EPOCH = datetime.datetime(1970, 1, 1)
 
 
@@ -23,18 +23,18 @@ def date(seconds):
 
 
 def draw(joint, day):
-    """Estimates with their intervals over the day; changes, and estimates that told nothing, at its foot."""
+    """Estimates with their intervals over the day; changes, and estimates without a result, at its foot."""
     figure, axes = plt.subplots(figsize=plotting.PAGE_FIGURE, constrained_layout=True)
     lengths = any(e["backlash"] is not None for e in joint["series"])
     value, ends = ("backlash", "interval") if lengths else ("backlash_angle", "angle_interval")
     scale, unit = (1e6, "µm") if lengths else (1e3, "mrad")
-    told = [e for e in joint["series"] if e[ends] is not None and e[ends][1] is not None]
-    times = [date(e["time"]) for e in told]
-    axes.vlines(times, [scale * (e[ends][0] or 0) for e in told], [scale * e[ends][1] for e in told], color=TOLD,
+    known = [e for e in joint["series"] if e[ends] is not None and e[ends][1] is not None]
+    times = [date(e["time"]) for e in known]
+    axes.vlines(times, [scale * (e[ends][0] or 0) for e in known], [scale * e[ends][1] for e in known], color=KNOWN,
                 alpha=0.3, linewidth=1, label="95 %")
-    points = [(t, scale * e[value]) for t, e in zip(times, told) if e[value] is not None]
-    axes.plot([t for t, _ in points], [v for _, v in points], ".", color=TOLD, markersize=3, label="play")
-    silent = [date(e["time"]) for e in joint["series"] if e not in told]
+    points = [(t, scale * e[value]) for t, e in zip(times, known) if e[value] is not None]
+    axes.plot([t for t, _ in points], [v for _, v in points], ".", color=KNOWN, markersize=3, label="play")
+    silent = [date(e["time"]) for e in joint["series"] if e not in known]
     axes.plot(silent, [0.02] * len(silent), "|", color=SILENT, markersize=5, transform=axes.get_xaxis_transform(),
               label="cannot tell")
     for change in joint["changes"]:
@@ -44,12 +44,12 @@ def draw(joint, day):
             axes.axvline(date(change["until"]), color=CHANGE, linewidth=1.2, linestyle=":", label=change["effect"] + ", until")
     axes.set_xlim(date(day["from"]), date(day["to"]))
     axes.xaxis.set_major_formatter(matplotlib.dates.ConciseDateFormatter(axes.xaxis.get_major_locator()))
-    if told:
+    if known:
         axes.set_ylim(bottom=0)
     axes.set_ylabel("play [%s]" % unit)
-    if not told:
+    if not known:
         axes.set_yticks([])
-        axes.set_ylabel("no estimate tells the play")
+        axes.set_ylabel("no estimate states the play")
     axes.set_xlabel("UTC")
     axes.legend(fontsize=7, loc="best")
     return plotting.picture(figure, joint["joint"])

@@ -12,6 +12,7 @@ scripts=${REPO}/scripts
 parts=(
   "tests run_nightly_tests"
   "readme_commands bash ${scripts}/check_readme.sh"
+  "howto_commands bash ${scripts}/check_howto.sh"
   "install_space bash ${scripts}/check_install.sh"
   "api_doc bash ${scripts}/api_doc.sh ${WS}/doc"
   "faults bash ${scripts}/fault_campaign.sh --seed 1 --count 20 all"

@@ -37,8 +37,8 @@ def two_engagements(data):
 
     def lacking(engagement):
         low, high = window(data, engagement["time"], SPAN, SPAN)
-        measured, told = data["measured"]["deflection"][low:high], model["traces"]["deflection"][low:high]
-        return sum(abs(v) for v in measured) - sum(abs(v) for v in told)
+        measured, predicted = data["measured"]["deflection"][low:high], model["traces"]["deflection"][low:high]
+        return sum(abs(v) for v in measured) - sum(abs(v) for v in predicted)
     return [max(inside, key=lacking), min(inside, key=lacking)]
 
 
@@ -53,13 +53,13 @@ def draw_deflection(axes, data, engagement):
     axes.set_ylabel("motor - load [mrad]")
 
 
-def draw_free(axes, data, engagement, measured, told, unit):
+def draw_free(axes, data, engagement, measured, predicted, unit):
     low, high = window(data, engagement["time"], 0.01, 0.1)
     time = [1e3 * (data["first_time"] + k * data["interval"] - engagement["time"]) for k in range(low, high)]
     scale = 1e3 if unit == "mrad" else 1
     axes.plot(time, finite(data["measured"][measured][low:high], scale), **MEASURED)
     for colour, model in zip(COLOURS, data["models"]):
-        axes.plot(time, finite(model["traces"][told][low:high], scale), lw=1.1, color=colour, label=model["name"])
+        axes.plot(time, finite(model["traces"][predicted][low:high], scale), lw=1.1, color=colour, label=model["name"])
     axes.set_xlabel("time after the middle of the gap [ms]")
     axes.set_ylabel("motor - load [%s]" % unit)
 

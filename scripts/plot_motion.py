@@ -56,7 +56,7 @@ def main():
         draw_load(right, trajectory["time"], trajectory[name + "/mesh_torque"], joint["gap"])
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
-    figure.suptitle("positive flank blue, negative flank orange: angles at which gravity holds the teeth there, loads that tell for certain",
+    figure.suptitle("positive flank blue, negative flank orange: angles at which gravity holds the teeth there, loads that are certain",
                     fontsize=9)
     plotting.save(figure, arguments.out, 90)
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws the JSON of separability_map: one column per disturbance, one row per way to tell backlash.
+"""Draws the JSON of separability_map: one column per disturbance, one row per way to estimate backlash.
 
 Exit codes: 0 done, 64 usage, 65 not a map, 66 map missing, 70 matplotlib missing, 73 cannot write.
 """

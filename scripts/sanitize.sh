@@ -21,7 +21,7 @@ install_dependencies run
 WS=${WS}_${kind}
 make_workspace
 echo "Building in ${WS}"
-# Debug information of lines only: the sanitizers tell places by it, and the build stays small.
+# Debug information of lines only: the sanitizers name places by it, and the build stays small.
 build all -DCMAKE_BUILD_TYPE=None "-DCMAKE_CXX_FLAGS=-O1 -g1 -fno-omit-frame-pointer ${flags}"
 use_workspace
 failed=0

@@ -70,7 +70,7 @@ run_tests rostests_beside_others 3 19 "${beside[@]}" || outside+=(--failed "run_
 
 echo "Checking style, documentation, installation and faults"
 check catkin_lint catkin_lint --strict "${REPO}"
-for part in licence format tidy headers rooms lanes pages; do
+for part in licence format tidy headers rooms lanes pages words messages; do
   check "${part}" nice -n 19 bash "${REPO}/scripts/check_style.sh" "${part}"
 done
 # One seed, one of each class; the long runs are in doc/reliability.md.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command fleet_report: what it is given, what it does in which order, what it tells."""
+"""The command fleet_report: what it is given, what it does in which order, what it reports."""
 import argparse
 import json
 import os
@@ -29,7 +29,7 @@ Exit codes, by the joint that needs a look most:
   0   healthy, or without limits
   1   watch: a grade is watch, or a limit is reached within the horizon
   2   fault found: service or stop, a limit exceeded, a change within a record
-  3   inconclusive: a joint cannot be told, or there is none
+  3   inconclusive: a joint has no answer, or there is none
   64  usage   65  bad input data   66  input missing, no scheduler   70  internal error   73  cannot write
   130 stopped by a signal: start it again to go on
 """
@@ -49,7 +49,7 @@ def _number(kind, lower):
 
 
 def parser():
-    p = plotting.Parser("Diagnoses the records of many joints, and tells which joints grow.")
+    p = plotting.Parser("Diagnoses the records of many joints, and reports which joints grow.")
     p.formatter_class = argparse.RawDescriptionHelpFormatter
     p.epilog = EPILOG
     p.add_argument("source", metavar="FOLDER|LIST", help="folder with records (.csv .bag .mcap .db3), or a text file with the "
@@ -149,7 +149,7 @@ class Run:
         finally:
             progress.end()
 
-    def tell(self):
+    def report(self):
         """Trends, page and JSON; returns the exit code."""
         names = self._state.joints()
         progress, asked = Progress("trends", len(names)), [0]
@@ -159,35 +159,35 @@ class Run:
             progress(asked[0])
         history.Trends(self._state, self._options.out, self._trend_command, self._options.horizon, self._version).run(names, each)
         progress.end()
-        told = self._write_joints(names)
-        told.sort(key=lambda item: joints.rank(item[0]))
-        fleet = self._fleet([item[0] for item in told])
+        written = self._write_joints(names)
+        written.sort(key=lambda item: joints.rank(item[0]))
+        fleet = self._fleet([item[0] for item in written])
         self._write("fleet.json", json.dumps(fleet, indent=1) + "\n")
-        self._write("fleet.html", fleet_page.page(fleet, {item[0]["joint"]: item[1] for item in told}))
+        self._write("fleet.html", fleet_page.page(fleet, {item[0]["joint"]: item[1] for item in written}))
         self._summarise(fleet)
         return fleet["exit_code"]
 
     def _write_joints(self, names):
         _folder(os.path.join(self._options.out, "joints"))
-        told = []
+        written = []
         for name in names:
             summary, series, rows = joints.summary(self._state, name)
             self._write("joints/%s.html" % history.file_name(name), joint_page.page(summary, series, rows, self._report_of))
-            told.append((summary, _thinned(series)))
-        return told
+            written.append((summary, _thinned(series)))
+        return written
 
     def _report_of(self, row):
         """Where the page of a record is, as seen from those of joints; None where there is none."""
         name = reports.file_name(row["key"]) if row["key"] else None
         return "../" + name if name and os.path.exists(os.path.join(self._options.out, name)) else None
 
-    def _fleet(self, told):
+    def _fleet(self, summaries):
         return {"schema_version": 1, "version": self._version, "command": "rosrun backlash_diagnosis " + shlex.join(
                     [NAME] + sys.argv[1:]), "written": history.date(time.time()), "seconds": time.time() - self._begin,
-                "exit_code": joints.exit_code([joint["level"] for joint in told]), "horizon": self._options.horizon,
+                "exit_code": joints.exit_code([joint["level"] for joint in summaries]), "horizon": self._options.horizon,
                 "records": {"found": self._found, "computed": self._computed, "by_status": self._state.counts()},
-                "levels": {level: sum(joint["level"] == level for joint in told) for level in joints.LEVELS},
-                "joints": told,
+                "levels": {level: sum(joint["level"] == level for joint in summaries) for level in joints.LEVELS},
+                "joints": summaries,
                 "without_joint": [{"record": row["name"], "reason": row["reason"]}
                                   for row in self._state.without_joint(WITHOUT_JOINT)]}
 
@@ -228,7 +228,7 @@ def main():
     run = Run(options)
     try:
         engine.run(run.compute())
-        return run.tell()
+        return run.report()
     finally:
         run.close()
 

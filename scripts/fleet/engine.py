@@ -129,15 +129,15 @@ class Engine:
                     if not suspects:
                         return
                     self._submit([[dict(suspects.pop(), alone=True)]], flying, ended)
-                told = []
+                done = []
                 for key, rows in await self._next(ended, stop):
                     group = flying.pop(key)
                     if rows is _KILLED and not group[0].get("alone"):
                         suspects += group
                     else:
-                        told += self._told(group, rows)
-                await take(told)
-                self._resize([row for _, row in told])
+                        done += self._with_rows(group, rows)
+                await take(done)
+                self._resize([row for _, row in done])
         finally:
             stop.cancel()
             if flying:
@@ -178,7 +178,7 @@ class Engine:
         return [(key, self._rows(*outcome)) for key, _, outcome in several]
 
     @staticmethod
-    def _told(group, rows):
+    def _with_rows(group, rows):
         """Each task with its row."""
         if isinstance(rows, list):
             return list(zip(group, rows))
@@ -203,7 +203,7 @@ async def _outcome(future):
         return "finished", await future
     except asyncio.CancelledError:
         return "cancelled", None
-    except Exception as error:  # noqa: BLE001 whatever a worker sends back is told
+    except Exception as error:  # noqa: BLE001 whatever a worker sends back is reported
         return future.status, error
 
 

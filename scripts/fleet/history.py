@@ -117,6 +117,6 @@ class Trends:
         with self._state.transaction():
             for future in done:
                 joint, digest = asked.pop(future)
-                exit_code, told = future.result()
-                self._state.put_trend(joint, digest, exit_code, json.dumps(told))
+                exit_code, result = future.result()
+                self._state.put_trend(joint, digest, exit_code, json.dumps(result))
                 each()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is told of each joint: its grade now, its trend, what cannot be told. Nothing is estimated here."""
+"""What is reported of each joint: its grade now, its trend, what is not known. Nothing is estimated here."""
 import json
 
 from . import errors, history
@@ -15,7 +15,7 @@ _CODES = {"fault": errors.FAULT, "watch": errors.WATCH, "cannot_tell": errors.IN
 
 
 def _newest(rows):
-    """The record that tells how the joint is; where none has a time, the worst."""
+    """The record that shows how the joint is; where none has a time, the worst."""
     dated = history.usable(rows)
     if dated:
         return dated[-1]
@@ -63,25 +63,25 @@ def summary(state, joint):
     angular = newest is not None and newest["backlash"] is None and newest["angle"] is not None
     if trend and trend.get("unit"):
         angular = trend["unit"] == "rad"
-    told = {"joint": joint, "level": level, "grade": newest["grade"] if newest is not None else None,
-            "records": len(rows), "usable": sum(row["status"] == "done" for row in rows),
-            "unit": "rad" if angular else "m", "backlash": None, "interval": None, "time": None, "date": None,
-            "message": None, "record": None, "changes": _changes(newest), "notes": _notes(rows, newest)}
+    entry = {"joint": joint, "level": level, "grade": newest["grade"] if newest is not None else None,
+             "records": len(rows), "usable": sum(row["status"] == "done" for row in rows),
+             "unit": "rad" if angular else "m", "backlash": None, "interval": None, "time": None, "date": None,
+             "message": None, "record": None, "changes": _changes(newest), "notes": _notes(rows, newest)}
     if newest is not None:
         value, ends = ("angle", ("angle_lower", "angle_upper")) if angular else ("backlash", ("lower", "upper"))
-        told.update(backlash=newest[value], interval=[newest[end] for end in ends], time=newest["time"],
-                    date=history.date(newest["time"]) if newest["time"] is not None else None,
-                    message=json.loads(newest["verdict"])["message"], record=newest["name"])
-    told["trend"] = {key: value for key, value in trend.items() if key != "series"} if trend else None
-    return told, (trend or {}).get("series"), rows
+        entry.update(backlash=newest[value], interval=[newest[end] for end in ends], time=newest["time"],
+                     date=history.date(newest["time"]) if newest["time"] is not None else None,
+                     message=json.loads(newest["verdict"])["message"], record=newest["name"])
+    entry["trend"] = {key: value for key, value in trend.items() if key != "series"} if trend else None
+    return entry, (trend or {}).get("series"), rows
 
 
-def rank(told):
+def rank(entry):
     """Sorts joints: those that need a look first, among them those that grow, by the date of the limit and the rate."""
-    trend = told["trend"] or {}
+    trend = entry["trend"] or {}
     reaches = (trend.get("reaches") or {}).get("time")
-    return (LEVELS.index(told["level"]), not trend.get("grows"), reaches is None, reaches or 0,
-            -(trend.get("rate") or 0), told["joint"])
+    return (LEVELS.index(entry["level"]), not trend.get("grows"), reaches is None, reaches or 0,
+            -(trend.get("rate") or 0), entry["joint"])
 
 
 def exit_code(levels):

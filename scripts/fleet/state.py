@@ -155,7 +155,7 @@ class State:
         self._base.execute("UPDATE record SET waits = 0, reason = coalesce(reason, 'no longer there') "
                            "WHERE seen != ? AND waits != 0", (self.run,))
 
-    # What is told of it.
+    # What is reported of it.
 
     def counts(self):
         """Number of records by status."""

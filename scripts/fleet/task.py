@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One record on one worker: runs the offline command and tells how it ended.
+"""One record on one worker: runs the offline command and reports how it ended.
 
 This module is sent to the workers as it is, so that they need Dask and the commands but no file of this folder: only
 the standard library here.
@@ -58,38 +58,38 @@ def _ends(interval):
     return interval if interval else [None, None]
 
 
-def _answer(told):
+def _answer(result):
     """Of the JSON of diagnose_record what the state keeps."""
-    verdict = told["verdict"]
+    verdict = result["verdict"]
     row = {"grade": verdict["grade"], "message": verdict["message"], "methods": "+".join(verdict["members"]),
-           "rig": told["rig"], "rig_digest": told["rig_digest"]}
+           "rig": result["rig"], "rig_digest": result["rig_digest"]}
     for column, key in _VERDICT.items():
         row[column] = verdict[key]
     for columns, key in _INTERVAL.items():
         row.update(zip(columns, _ends(verdict[key])))
-    row["begin"], row["end"] = _ends(told["time"])
-    skewness = [e["skewness"] for e in told["estimates"] if e["method"] == "apd_skewness"]
+    row["begin"], row["end"] = _ends(result["time"])
+    skewness = [e["skewness"] for e in result["estimates"] if e["method"] == "apd_skewness"]
     row["skewness"] = skewness[0] if skewness else None
-    row["estimates"] = json.dumps(told["estimates"])
+    row["estimates"] = json.dumps(result["estimates"])
     row["verdict"] = json.dumps(verdict)
-    row["warnings"] = json.dumps(told["warnings"])
+    row["warnings"] = json.dumps(result["warnings"])
     return row
 
 
 def _changes(words, time_limit):
     """Residual and change points by detect_changes, or why there are none."""
     try:
-        _, told = _run(words, time_limit)
+        _, result = _run(words, time_limit)
     except _Ended as ended:
         return {"changes": json.dumps({"status": ended.args[0], "reason": ended.args[1]})}
-    if told is None:
+    if result is None:
         return {"changes": json.dumps({"status": "cannot_tell", "reason": "the record cannot be judged"})}
-    found = told["changes"]
-    if not found and told["cannot_tell"]:
-        return {"changes": json.dumps({"status": "cannot_tell", "reason": told["cannot_tell"]}),
-                "residual": told["healthy_residual"]}
+    found = result["changes"]
+    if not found and result["cannot_tell"]:
+        return {"changes": json.dumps({"status": "cannot_tell", "reason": result["cannot_tell"]}),
+                "residual": result["healthy_residual"]}
     return {"changes": json.dumps({"status": "done", "changes": found}),
-            "residual": found[0]["error_before"] if found else told["healthy_residual"]}
+            "residual": found[0]["error_before"] if found else result["healthy_residual"]}
 
 
 def run(spec):
@@ -97,13 +97,13 @@ def run(spec):
     start = time.time()
     row = {"key": spec["key"], "host": socket.gethostname()}
     try:
-        row["exit_code"], told = _run(spec["command"], spec["time_limit"])
-        if told is None:
-            raise _Ended("crashed", "diagnose_record told nothing")
-        if told["version"] != spec["version"]:
+        row["exit_code"], result = _run(spec["command"], spec["time_limit"])
+        if result is None:
+            raise _Ended("crashed", "diagnose_record printed no JSON")
+        if result["version"] != spec["version"]:
             raise _Ended("crashed", "this worker has version %s of diagnose_record, the run is of %s"
-                         % (told["version"], spec["version"]))
-        row.update(_answer(told), status="done", reason=told["verdict"]["message"])
+                         % (result["version"], spec["version"]))
+        row.update(_answer(result), status="done", reason=result["verdict"]["message"])
         if spec["changes"]:
             row.update(_changes(spec["changes"], spec["time_limit"]))
     except _Ended as ended:

@@ -67,7 +67,7 @@ std::vector<std::string> term_names() {
   return names;
 }
 
-/// Columns of a file; messages of an arm have the robot's own names.
+/// Columns of a file; the messages of an arm's topics have the robot's own names.
 record::ChannelMap read_joint_channels(const YamlReader& yaml, const std::string& joint,
                                        const record::ChannelMap& time, record::Channel channel) {
   const auto channels = yaml.optional_map("channels");

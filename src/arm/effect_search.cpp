@@ -11,21 +11,21 @@
 namespace backlash::arm {
 namespace {
 
-constexpr double kToldApart =
-    1e-4;                        // - of a column's squares that must not follow from the fit's own; choice
-constexpr double kNone = 1e-9;   // - of a column, of what follows from others; rounding
-constexpr double kNearly = 0.9;  // - of the best's share: not told from it; choice
+constexpr double kLeastOwn = 1e-4;  // - of a column's squares that must not follow from the fit's own; choice
+constexpr double kNone = 1e-9;      // - of a column, of what follows from others; rounding
+constexpr double kNearly = 0.9;     // - of the best's share: not distinguished from it; choice
 constexpr double kSpeeds[] = {0.05, 0.1, 0.2, 0.4, 0.7};  // of the rms speed; choice
 constexpr double kDistances[] = {0.01, 0.03, 0.08, 0.2};  // s, times the rms speed; choice
 constexpr double kMostOrder = 80;                         // 1/rad; choice
-constexpr double kOrdersPerTurn = 4;       // steps of 2 pi over the travel, by which orders are told; choice
+constexpr double kOrdersPerTurn =
+    4;  // steps of 2 pi over the travel, by which orders are distinguished; choice
 constexpr double kLeastStep = 0.1;         // 1/rad; choice (time)
 constexpr double kFastest = 2;             // times torque_cutoff, of a wave at the rms speed; choice
 constexpr double kScaleStep = 0.7;         // of a speed or distance, between those tried; choice
 constexpr std::size_t kSamplesPerRow = 8;  // of a column before its low-pass, at least; choice
 constexpr int kRefinements = 4;            // of a shape, each a third of the step before; choice
 
-/// With fewer samples, where there are far more than the low-pass leaves: a search takes hundreds of columns.
+/// Thinned where there are far more samples than the low-pass leaves: a search takes hundreds of columns.
 ArmMotion thinned(const ArmMotion& m) {
   const std::size_t apart = m.rows.size() > 1 ? m.rows[1] - m.rows[0] : 1;
   std::size_t by = std::max<std::size_t>(1, apart / kSamplesPerRow);
@@ -50,7 +50,7 @@ ArmMotion thinned(const ArmMotion& m) {
 
 /// What the fit leaves of one joint, without what it could have changed. Links and drives are known from the
 /// training, where an effect is of the test record alone.
-struct Left {
+struct Remainder {
   std::vector<std::vector<Eigen::Index>> rows;  // that count, per motion
   Eigen::MatrixXd basis;                        // orthonormal, of the fit's own columns
   Eigen::VectorXd residual;                     // beside them
@@ -77,14 +77,14 @@ class Search {
   std::vector<double> gain_shares() const;
 
  private:
-  Left left_of(std::size_t j) const;
+  Remainder left_of(std::size_t j) const;
   bool could_change(Eigen::Index unknown) const;
   std::vector<JointEffect> effects_of(std::size_t j) const;
-  Eigen::MatrixXd columns(const Left& left, const JointEffect& effect, std::size_t j) const;
+  Eigen::MatrixXd columns(const Remainder& left, const JointEffect& effect, std::size_t j) const;
   /// Share of the residual's squares that it takes; its values.
-  double share(const Left& left, JointEffect& effect, std::size_t j) const;
+  double share(const Remainder& left, JointEffect& effect, std::size_t j) const;
   double order_step(std::size_t j) const;
-  void refine(const Left& left, EffectGuess& guess, std::size_t j) const;
+  void refine(const Remainder& left, EffectGuess& guess, std::size_t j) const;
   std::vector<EffectGuess> best_of(std::size_t j) const;
 
   const ArmFit& fit_;
@@ -138,8 +138,8 @@ bool Search::could_change(Eigen::Index unknown) const {
   return unknown >= at.payload() && !drive;
 }
 
-Left Search::left_of(std::size_t j) const {
-  Left left;
+Remainder Search::left_of(std::size_t j) const {
+  Remainder left;
   Eigen::Index rows = 0, columns = 0;
   for (std::size_t m = 0; m < motions_.size(); ++m) {
     left.rows.emplace_back();
@@ -185,7 +185,7 @@ std::vector<JointEffect> Search::effects_of(std::size_t j) const {
         for (const double time : kDistances) add(spec, time * speed_[j]);
         break;
       case EffectShape::none:
-        // What the fit has of a drive it has of all records.
+        // The fit knows a drive from all records.
         if (everywhere_ && (stands_for_term(spec, fit_.rig) || spec.id == gain_of_drive().id)) break;
         if (!is_coupling({spec.id, 0, "", Eigen::Vector2d::Zero()}))
           add(spec);
@@ -200,7 +200,7 @@ double Search::order_step(std::size_t j) const {
   return std::max(kLeastStep, 2 * M_PI / travel_[j] / kOrdersPerTurn);
 }
 
-Eigen::MatrixXd Search::columns(const Left& left, const JointEffect& effect, std::size_t j) const {
+Eigen::MatrixXd Search::columns(const Remainder& left, const JointEffect& effect, std::size_t j) const {
   Eigen::MatrixXd out(left.residual.size(), effect.spec().columns);
   Eigen::Index row = 0;
   for (std::size_t m = 0; m < motions_.size(); ++m) {
@@ -210,12 +210,12 @@ Eigen::MatrixXd Search::columns(const Left& left, const JointEffect& effect, std
   return out;
 }
 
-double Search::share(const Left& left, JointEffect& effect, std::size_t j) const {
+double Search::share(const Remainder& left, JointEffect& effect, std::size_t j) const {
   const Eigen::MatrixXd z = columns(left, effect, j);
   const Eigen::MatrixXd own = z - left.basis * (left.basis.transpose() * z);
   const Eigen::MatrixXd gram = own.transpose() * own;
   for (Eigen::Index i = 0; i < z.cols(); ++i)
-    if (!(gram(i, i) > kToldApart * z.col(i).squaredNorm())) return 0;
+    if (!(gram(i, i) > kLeastOwn * z.col(i).squaredNorm())) return 0;
   const Eigen::VectorXd moment = own.transpose() * left.residual;
   const Eigen::VectorXd values = signal::solve_symmetric(gram, moment);
   effect.values.head(z.cols()) = values;
@@ -224,7 +224,7 @@ double Search::share(const Left& left, JointEffect& effect, std::size_t j) const
   return std::isfinite(taken) ? taken : 0;
 }
 
-void Search::refine(const Left& left, EffectGuess& guess, std::size_t j) const {
+void Search::refine(const Remainder& left, EffectGuess& guess, std::size_t j) const {
   JointEffect& best = guess.effect.effect;
   const EffectShape shape = best.spec().shape;
   double step = shape == EffectShape::order ? order_step(j) : kScaleStep * best.shape;
@@ -243,7 +243,7 @@ void Search::refine(const Left& left, EffectGuess& guess, std::size_t j) const {
 }
 
 std::vector<EffectGuess> Search::best_of(std::size_t j) const {
-  const Left left = left_of(j);
+  const Remainder left = left_of(j);
   if (left.residual.size() <= 2 * left.basis.cols()) return {};
   std::map<std::string, EffectGuess> best;  // of each effect by its name
   for (JointEffect& e : effects_of(j)) {

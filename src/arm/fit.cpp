@@ -27,7 +27,7 @@ constexpr double kLeastShape = 0.2;  // of what it was, after a step; choice
 
 using Mask = Eigen::Matrix<char, Eigen::Dynamic, Eigen::Dynamic>;
 
-/// How many successive rows say the same once: 1 + 2 sum of the residual's autocorrelation.
+/// How many successive rows count as one: 1 + 2 sum of the residual's autocorrelation.
 double memory(const std::vector<Eigen::VectorXd>& residuals, double step) {
   double square = 0;
   for (const Eigen::VectorXd& r : residuals) square += r.squaredNorm();
@@ -329,7 +329,7 @@ void Fit::set_drives(ArmFit& fit, const Eigen::MatrixXd& covariance) const {
     for (Eigen::Index i = 0; i < j; ++i)
       if (const double c = covariance(layout_.kappa(i), layout_.kappa(j)); c != 0) shared += c, pairs += 1;
   }
-  // What all share is no more than the best of them is known to: each has the rest by itself.
+  // The error that all share is at most that of the best known: each has the rest by itself.
   if (freedom_.constants && pairs > 0)
     fit.rig.common_error = std::sqrt(std::max(0.0, std::min(shared / pairs, least)));
   for (Eigen::Index j = 0; j < count; ++j) {

@@ -86,7 +86,7 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
       own.push_back(drive.constant_error * drive.constant_error);
     }
   }
-  // Links that are known hold what all constants have in common: then it is no unknown of the fit.
+  // Known links fix what all constants have in common: then it is no unknown of the fit.
   set_constants(own, freedom.links ? rig.common_error : 0);
   for (std::size_t i = 0; i < freedom.effects.size(); ++i) {
     const FreeEffect& e = freedom.effects[i];

@@ -15,12 +15,12 @@ constexpr std::size_t kMostRecords = 8;  // choice (time)
 // Friction below so much of the torque has no sign; so much of it must drive. Choices: measured and drawn
 // joints have friction that takes power all the time.
 constexpr double kLeastFriction = 0.03, kDriving = 0.2;
-// Left of a joint's torque, over which a fit is told to be none. Choices: the joints of the measured arm
-// leave 1 to 4 %, up to four times the noise.
-constexpr double kMisfit = 0.1, kFarAboveNoise = 5;
+// Share of a joint's torque that a fit leaves, above which a warning says that it is no fit. Choices: the
+// joints of the measured arm leave 1 to 4 %, up to four times the noise.
+constexpr double kMostUnexplained = 0.1, kFarAboveNoise = 5;
 constexpr double kTimes = 2;  // choice: between 1.2 and 3.4, see the header
 
-/// Of each record that tells the arm by itself.
+/// Of each record that identifies the arm by itself.
 std::vector<ArmFit> fits_alone(const ArmRig& rig, const std::vector<RecordMotions>& records,
                                const FitSettings& settings, const Progress& progress) {
   std::vector<ArmFit> fits;
@@ -76,7 +76,7 @@ Rubbing rubbing_of(const JointDrive& drive, const RecordMotions& motions, std::s
   return sum;
 }
 
-/// Friction takes power. Where it comes out as a drive, torque and position count against each other.
+/// Friction takes power. Where it comes out as driving, torque or position has the wrong sign.
 void require_rubbing(const ArmFit& fit, const RecordMotions& motions) {
   for (std::size_t j = 0; j < fit.rig.joints.size(); ++j) {
     const JointDrive& drive = fit.rig.joints[j];
@@ -94,7 +94,7 @@ void require_rubbing(const ArmFit& fit, const RecordMotions& motions) {
 
 void warn_of_misfit(ArmFit& fit) {
   for (std::size_t j = 0; j < fit.train.size(); ++j)
-    if (fit.train[j] > std::max(kMisfit, kFarAboveNoise * fit.floor[j]))
+    if (fit.train[j] > std::max(kMostUnexplained, kFarAboveNoise * fit.floor[j]))
       fit.warnings.push_back(
           fmt::format("{}: the fitted arm leaves {:.3g} % of its torque where noise alone would leave "
                       "{:.3g} %: it has an effect that the rig file lacks, or its signs, axis or links are "
@@ -135,7 +135,7 @@ ArmFit fit_loaded(const ArmRig& rig, std::vector<RecordMotions> records,
   return fit;
 }
 
-/// A weight that contradicts the declared constants may be another one, or of another record.
+/// A weight that contradicts the declared constants may be wrong, or belong to another record.
 void warn_of_scale(const ArmRig& declared, ArmFit& fit) {
   double sum = 0, own = 0, count = 0;
   for (std::size_t j = 0; j < declared.joints.size(); ++j) {
@@ -149,8 +149,8 @@ void warn_of_scale(const ArmRig& declared, ArmFit& fit) {
                error = std::hypot(declared.common_error, std::sqrt(own) / count);
   if (std::fabs(std::log(scale)) > kFarFromDeclared * error)
     fit.warnings.push_back(fmt::format(
-        "by the weight the torque constants are {:.3g} times the declared ones, which are known to "
-        "{:.2g} %: look whether the weight is right, and of this record",
+        "the known weight makes the torque constants {:.3g} times the declared ones, which are known to "
+        "{:.2g} %: check the weight, and that it belongs to this record",
         scale, 100 * error));
 }
 
@@ -171,8 +171,8 @@ std::vector<Contradiction> contradictions(const ArmFit& together, const std::vec
 
 std::string description(const std::vector<Contradiction>& all) {
   std::string text =
-      "records contradict each other: they are not of one arm, or it has changed between them, or carries a "
-      "body in some of them. Left of the torque by all together, and at most by each alone: ";
+      "records contradict each other: they are of different arms, or the arm has changed between them, or "
+      "carries a body in some of them. Share of the torque left by a fit to all, and at most by each alone: ";
   for (const Contradiction& c : all)
     text += fmt::format("{}{} {:.3g} and {:.3g} %", &c == &all.front() ? "" : ", ", c.joint, 100 * c.together,
                         100 * c.alone);

@@ -58,7 +58,7 @@ double sum_of(const std::vector<double>& parts) {
   return sum;
 }
 
-/// Less by kClearly, and less in every motion.
+/// Smaller by kClearly, and smaller in every motion.
 bool clearly_less(const std::vector<double>& left, const std::vector<double>& declared) {
   for (std::size_t m = 0; m < left.size(); ++m)
     if (declared[m] > 0 && !(left[m] < declared[m])) return false;

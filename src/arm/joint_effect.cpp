@@ -133,7 +133,7 @@ std::string joint_effect_text(const JointEffect& effect) {
 
 namespace {
 
-/// Way since the joint last turned round, at the samples; before it first does, that is over.
+/// Way since the joint last turned round, at the samples; before the first turn it counts as long ago.
 Eigen::ArrayXd way_since_reversal(const ArmMotion& m, Eigen::Index j) {
   Eigen::ArrayXd way(m.motor_v.rows());
   double sum = INFINITY, before = 0;

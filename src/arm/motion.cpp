@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kRowsPerCycle = 5;         // choice: of torque_cutoff; two would do for a perfect low-pass
 constexpr double kEdge = 1;                 // cycles of torque_cutoff that a low-pass needs to settle; choice
-constexpr int kNoiseOrder = 3;              // of the differences that tell white noise; choice
+constexpr int kNoiseOrder = 3;              // of the differences that show white noise; choice
 constexpr double kLargestDeflection = 0.1;  // rad, of a gear between its encoders; choice
 constexpr double kBackwards = 2;  // theory: 0 of an encoder that follows, 1 of one of two that rest; choice
 /// Theory: of white noise at sampling interval T, low_pass(f) leaves the variance share 2 T f times the
@@ -49,8 +49,8 @@ Kinematics smooth_kinematics(const record::Record& r, record::Channel position, 
   return k;
 }
 
-/// The load's encoder is that of the link: it follows the motor's but for its zero and a deflection, and
-/// turns the same way. One that counts the other way moves against the motor by twice of what the joint
+/// Whether the load's encoder is that of the link: it follows the motor's but for its zero and a deflection,
+/// and turns the same way. One that counts the other way moves against the motor by twice of what the joint
 /// moves, and read backwards hardly at all; a link in its gap moves as much against the motor as read
 /// backwards.
 bool follows(const record::Record& r) {

@@ -64,7 +64,7 @@ std::vector<double> relative_errors(const ArmFit& fit, const FitFreedom& freedom
 
 namespace {
 
-/// Variance of what couplings bring of other drives, whose torques are as well known as they are foretold;
+/// Variance of what couplings bring of other drives, whose torques are as well known as they are predicted;
 /// at rest to their dry friction.
 double of_couplings(const ArmFit& fit, const FitFreedom& freedom, const FittedMotion& m, std::size_t j,
                     Eigen::Index row) {
@@ -85,7 +85,7 @@ double of_couplings(const ArmFit& fit, const FitFreedom& freedom, const FittedMo
 
 }  // namespace
 
-std::vector<double> foretold_errors(const ArmFit& fit, const FitFreedom& freedom,
+std::vector<double> expected_errors(const ArmFit& fit, const FitFreedom& freedom,
                                     const std::vector<FittedMotion>& motions, double least_seconds) {
   const std::size_t joints = fit.rig.joints.size();
   const FitModel model(fit.rig, freedom);

@@ -68,7 +68,7 @@ std::size_t rest_from(const Hold& h, const std::vector<char>& active, std::size_
   return active.size();
 }
 
-/// s, when the mean before `k` was within the noise last; all of its samples are before.
+/// s, when a mean before `k` was last within the noise; all samples of that mean are before.
 double last_within(const Hold& h, std::size_t k, double level, const PushSettings& settings) {
   while (k > 0 && std::fabs(h.smooth[k] - level) > settings.within * h.noise) --k;
   return h.time[k - std::min(k, std::size_t(settings.samples))];

@@ -11,7 +11,7 @@
 namespace backlash::arm {
 namespace {
 
-constexpr double kTold = 1e-4;  // choice: of a column's size, below which the motions do not show it
+constexpr double kLeastShown = 1e-4;  // choice: of a column's size, below which the motions do not show it
 constexpr double kNone =
     1e-9;  // choice: of the largest column of its kind, below which it is none but for rounding
 constexpr int kMostSteps = 100, kMostHalvings = 40;  // of Newton; choice
@@ -124,7 +124,7 @@ Regrouping::Regrouping(const Chain& chain, const std::vector<FittedMotion>& moti
       shown_[std::size_t(i)] = Shown::not_at_all;
       continue;
     }
-    if (!(left(i, i) > kTold * kTold * scale[i] * scale[i])) continue;
+    if (!(left(i, i) > kLeastShown * kLeastShown * scale[i] * scale[i])) continue;
     kept_.push_back(i);
     shown_[std::size_t(i)] = Shown::leads;
     left = (left - left.col(i) * left.row(i) / left(i, i)).eval();

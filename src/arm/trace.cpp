@@ -52,7 +52,7 @@ class Tracer {
   ArmTrace run(const std::vector<ArmRecord>& train, const ArmRecord& test, bool same_record);
 
  private:
-  void tell(double fraction, const char* phase) const {
+  void report(double fraction, const char* phase) const {
     if (progress_ && !progress_(fraction, phase)) throw Cancelled();
   }
   void set_base();
@@ -62,12 +62,12 @@ class Tracer {
   void look_for_pushes(const ArmRecord& test);
   bool holds(const Candidate& found, const Candidate& last, const Motions& judged) const;
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
-  void tell_chain(const std::vector<Candidate>& all, std::size_t best, const Candidate& last,
-                  const Motions& judged);
-  void tell_effects(const std::vector<Candidate>& found, const Motions& judged);
-  void tell_when(const Candidate& c);
-  void tell_rival(ArmStep& step, const Candidate& rival);
-  void tell_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike);
+  void report_chain(const std::vector<Candidate>& all, std::size_t best, const Candidate& last,
+                    const Motions& judged);
+  void report_effects(const std::vector<Candidate>& found, const Motions& judged);
+  void report_onset(const Candidate& c);
+  void report_rival(ArmStep& step, const Candidate& rival);
+  void report_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike);
   void finish(const Motions& judged, const Candidate& taken, bool named);
   std::optional<ArmTrace::Unexplained> worst_unexplained(const std::vector<double>& errors,
                                                          const std::vector<double>& expected) const;
@@ -79,7 +79,7 @@ class Tracer {
   Motions train_, test_;
   CandidateFits fits_;
   Candidate taken_;    // what was named
-  Candidate unnamed_;  // what foretells the test record best where nothing is named
+  Candidate unnamed_;  // what predicts the test record best where nothing is named
   ArmTrace trace_;
 };
 
@@ -98,24 +98,25 @@ void Tracer::set_base() {
   trace_.train = fits_.train_errors;
 }
 
-void Tracer::tell_effects(const std::vector<Candidate>& found, const Motions& judged) {
+void Tracer::report_effects(const std::vector<Candidate>& found, const Motions& judged) {
   for (const Candidate& c : found) {
     const double law = fits_.share_known(c, found.back(), judged);
     trace_.steps.push_back(step_of(c, found.back().fit, rig_, law));
-    tell_when(c);
+    report_onset(c);
   }
 }
 
-/// Of an effect of a joint whether the training records have it.
-void Tracer::tell_when(const Candidate& c) {
+/// Notes whether the training records have the effect of a joint.
+void Tracer::report_onset(const Candidate& c) {
   const FreeEffect& effect = c.freedom.effects.back();
   if (!rig_.fitted && !effect.everywhere)
     trace_.notes.push_back(effect.effect.id + " of " + rig_.joints[effect.joint].name +
                            " is of the test record, the training records do not have it");
 }
 
-/// What is taken away on one side does nearly what a body on the other side does: values hold both.
-void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
+/// A body taken away on one side does nearly what a body added on the other side does: the intervals contain
+/// both.
+void Tracer::report_rival(ArmStep& step, const Candidate& rival) {
   const ArmStep other = step_of(rival, rival.fit, rig_, settings_.law);
   for (std::size_t i = 0; i < step.parameters.size(); ++i) {
     signal::Measured& m = step.parameters[i].measured;
@@ -124,18 +125,18 @@ void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
   step.equivalent_to.emplace_back("payload (taken away)");
   trace_.notes.push_back(fmt::format(
       "a body that is gone does nearly as well as one that has come: {:.3g} kg; motion with faster turns, or "
-      "other poses, would tell them apart",
+      "other poses, would distinguish them",
       rival.fit.marked().mass.value));
 }
 
 /// Where friction is not that of the training: a step where it is more than a robot's warming up, else a
 /// note.
-void Tracer::tell_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike) {
+void Tracer::report_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike) {
   Candidate base;
   base.fit = fits_.base;
   Candidate against = c;
   judge(against, base, judged, rig_, settings_);
-  const std::vector<double> expected = fits_.foretold(c, judged),
+  const std::vector<double> expected = fits_.expected_errors(c, judged),
                             errors = relative_errors(c.fit, c.freedom, as_fitted(judged, true), 0);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     const signal::Measured& f = c.fit.marked().friction_factors[j];
@@ -170,39 +171,40 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged, const Fric
   }
 }
 
-/// What is told of the chain, with values of a fit that has all that was found.
-void Tracer::tell_chain(const std::vector<Candidate>& all, std::size_t best, const Candidate& last,
-                        const Motions& judged) {
-  const Candidate& told = all[best];
-  const double law = of_joint(told) ? fits_.share_known(told, last, judged) : settings_.law;
-  ArmStep step = step_of(told, last.fit, rig_, law);
-  if (const Candidate* rival = rival_of(all, best, settings_)) tell_rival(step, *rival);
+/// What is reported of the chain, with values of a fit that has all that was found.
+void Tracer::report_chain(const std::vector<Candidate>& all, std::size_t best, const Candidate& last,
+                          const Motions& judged) {
+  const Candidate& named = all[best];
+  const double law = of_joint(named) ? fits_.share_known(named, last, judged) : settings_.law;
+  ArmStep step = step_of(named, last.fit, rig_, law);
+  if (const Candidate* rival = rival_of(all, best, settings_)) report_rival(step, *rival);
   for (const std::string& name : as_good_as(all, best, settings_)) step.equivalent_to.push_back(name);
   trace_.steps.push_back(step);
-  if (of_joint(told)) tell_when(told);
+  if (of_joint(named)) report_onset(named);
   const double common = rig_.fitted ? rig_.common_error : last.fit.rig.common_error;
-  if (told.freedom.payload && common > 0)
+  if (named.freedom.payload && common > 0)
     trace_.notes.push_back(fmt::format(
-        "the mass has the scale of the torque constants, which all together are known to {:.2g} %, "
-        "as its error holds; a known weight measures them (identify --payload)",
+        "the mass scales with the torque constants, which together are known to {:.2g} % (part of its "
+        "error); a known weight measures them (identify --payload)",
         100 * common));
   for (const Candidate& c : all)
-    if (c.reason.empty() && told.freedom.payload && c.freedom.payload &&
-        *c.freedom.payload != *told.freedom.payload && told.all - c.all < -std::log(1 - settings_.same_link))
+    if (c.reason.empty() && named.freedom.payload && c.freedom.payload &&
+        *c.freedom.payload != *named.freedom.payload &&
+        named.all - c.all < -std::log(1 - settings_.same_link))
       trace_.notes.push_back("a payload at " + rig_.chain.joints[*c.freedom.payload].link +
                              " does nearly as well");
 }
 
-/// Whether what was found of the chain is still there beside what was found after it, and explains the
+/// Whether what was found of the chain still holds beside what was found after it, and explains the
 /// joints: where one is left unexplained, values that take most of it away need not be those of the machine.
 /// What the training records show may be another one in the test record, see changed_since().
 bool Tracer::holds(const Candidate& found, const Candidate& last, const Motions& judged) const {
   if (!(errors_from_none(found, last.fit) > settings_.sure)) return false;
-  const std::vector<double> expected = fits_.foretold(last, judged),
+  const std::vector<double> expected = fits_.expected_errors(last, judged),
                             errors = relative_errors(last.fit, last.freedom, as_fitted(judged, true), 0);
   for (std::size_t j = 0; &judged != &test_ && j < errors.size(); ++j) {
     const double most =
-        of_joint(found) && j == found.joint ? most_left(found, settings_) : settings_.foretold;
+        of_joint(found) && j == found.joint ? most_left(found, settings_) : settings_.most_of_expected;
     if (errors[j] > most * expected[j]) return false;
   }
   return true;
@@ -215,8 +217,8 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   std::vector<Candidate> all = chain_candidates(rig_);
   const std::vector<double> gains = gain_shares(without.fit, without.freedom, as_fitted(fitted, true));
   for (std::size_t i = 0; i < all.size(); ++i) {
-    tell(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
-    // Whether something has come or gone is clear from the last link.
+    report(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
+    // The last link shows whether something has come or gone.
     if (all[i].freedom.payload && i > 1 && (all[0].all > all[1].all) != (all[i].freedom.payload_sign > 0))
       all[i].reason = "not tried";
     else if (of_joint(all[i]) && gains[all[i].joint] < settings_.least_at_joint / 2)
@@ -232,7 +234,7 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
                                  all[i].reason, of_joint(all[i]) ? rig_.joints[all[i].joint].name : ""});
   trace_.notes.clear();
   std::size_t best = best_of(all, settings_);
-  tell(0.9, "trying effects of single joints");
+  report(0.9, "trying effects of single joints");
   JointEffectsFound effects = joint_effects(best < all.size() ? all[best] : without, fits_, fitted, judged);
   if (best < all.size() &&
       !holds(all[best], effects.steps.empty() ? all[best] : effects.steps.back(), judged)) {
@@ -245,9 +247,9 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   const Candidate& of_chain = best < all.size() ? all[best] : without;
   trace_.rejected.insert(trace_.rejected.end(), effects.rejected.begin(), effects.rejected.end());
   const Candidate& taken = effects.steps.empty() ? of_chain : effects.steps.back();
-  if (best < all.size()) tell_chain(all, best, taken, judged);
-  tell_effects(effects.steps, judged);
-  tell_friction(taken, judged, effects.friction_alike);
+  if (best < all.size()) report_chain(all, best, taken, judged);
+  report_effects(effects.steps, judged);
+  report_friction(taken, judged, effects.friction_alike);
   if (trace_.steps.empty()) {
     unnamed_ = without;
     return false;
@@ -259,7 +261,7 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   return true;
 }
 
-/// Errors on the part that is judged, and the rig with what is named; `taken` is the model that foretells
+/// Errors on the part that is judged, and the rig with what is named; `taken` is the model that predicts
 /// best, also where nothing of it is named.
 void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
   const double least = settings_.fit.least_seconds;
@@ -270,13 +272,13 @@ void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
   if (named) trace_.augmented = augmented_rig(rig_, taken);
   trace_.series = named ? series_of(judged, fits_.base, taken.freedom, taken.fit, true)
                         : series_of(judged, fits_.base, {}, fits_.base, false);
-  trace_.unexplained = worst_unexplained(best, fits_.foretold(taken, judged));
+  trace_.unexplained = worst_unexplained(best, fits_.expected_errors(taken, judged));
 }
 
 std::optional<ArmTrace::Unexplained> Tracer::worst_unexplained(const std::vector<double>& errors,
                                                                const std::vector<double>& expected) const {
   std::optional<ArmTrace::Unexplained> out;
-  double worst = settings_.foretold;
+  double worst = settings_.most_of_expected;
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     const double ratio = errors[j] / expected[j];
     if (!(ratio > worst)) continue;
@@ -287,7 +289,7 @@ std::optional<ArmTrace::Unexplained> Tracer::worst_unexplained(const std::vector
   return out ? out : worst_left(errors);
 }
 
-/// The training records may lack as much, and let expect it.
+/// The training records may leave as much, so that it is expected.
 std::optional<ArmTrace::Unexplained> Tracer::worst_left(const std::vector<double>& errors) const {
   std::optional<ArmTrace::Unexplained> out;
   double worst = settings_.much;
@@ -369,12 +371,12 @@ void Tracer::search_all(bool same_record) {
 
 ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test, bool same_record) {
   trace_.joints = rig_.joint_names();
-  tell(0, "reading the motion");
+  report(0, "reading the motion");
   std::vector<RecordMotions> records;
   for (const ArmRecord& record : train) records.push_back(motions_of(record, rig_, trace_.warnings));
   for (const RecordMotions& record : records) train_.insert(train_.end(), record.begin(), record.end());
   test_ = motions_of(test, rig_, trace_.warnings);
-  tell(0.1, "fitting the base machine");
+  report(0.1, "fitting the base machine");
   try {
     if (!rig_.fitted) require_one_arm(fit_records(rig_, records, settings_.fit));
     set_base();

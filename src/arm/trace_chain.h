@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is tried of a whole arm before effects of single joints, and which of it is told: a body that has come
-// or is gone, gravity from another direction; and the gain of one motor, which a body can look like.
+// What is tried of a whole arm before effects of single joints, and which of it is reported: a body that has
+// come or is gone, gravity from another direction; and the gain of one motor, which a body can look like.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@ bool of_joint(const Candidate& c);
 /// In their order: a payload at the last link, come or gone, first; gains of single motors last.
 std::vector<Candidate> chain_candidates(const ArmRig& rig);
 
-/// The one to tell of those that are believed; none: the end of the list.
+/// The one to report of those that are believed; none: the end of the list.
 std::size_t best_of(const std::vector<Candidate>& all, const ArmTraceSettings& settings);
 
 /// A body at the last link that has come, or is gone, and does as well as the other of the two.

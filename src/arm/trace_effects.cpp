@@ -21,7 +21,7 @@ class EffectSteps {
   std::optional<Candidate> next(const Candidate& model) const;
   /// Instead of a factor of all friction of that joint.
   std::optional<Candidate> other_friction(const Candidate& model, std::size_t joint) const;
-  /// Where a joint is left unexplained, what takes the most of it away need not be what it lacks.
+  /// Where a joint stays unexplained, the effect that takes most of it away need not be the missing one.
   void drop_what_does_not_explain(const Candidate& model) const;
 
  private:
@@ -39,7 +39,7 @@ class EffectSteps {
   JointEffectsFound& found_;
 };
 
-/// That friction is another one is known; which one remains to be told, however small it is.
+/// Friction is known to be another one; which one is still to be reported, however small it is.
 ArmTraceSettings EffectSteps::settings_for_other_friction() const {
   ArmTraceSettings settings = fits_.settings;
   settings.least_at_joint = settings.least_gain;
@@ -66,7 +66,7 @@ Candidate EffectSteps::with(const Candidate& model, const EffectGuess& guess, bo
   c.freedom.effects.back().everywhere = everywhere;
   c.freedom.effects.back().of_term = is_of_term(guess);
   fits_.fit(c, fitted_);
-  // From where it has come to, so that what is found next does not gain by settling this one.
+  // Starts from the last fit, so that the next effect gains nothing by settling this one.
   for (std::size_t i = 0; i < c.freedom.effects.size(); ++i)
     c.freedom.effects[i].effect = c.fit.effects[i].effect;
   fits_.fit(c, fitted_);
@@ -79,7 +79,8 @@ std::optional<Candidate> EffectSteps::next(const Candidate& model, bool everywhe
   const std::vector<FittedMotion> motions = everywhere ? fits_.motions(fitted_) : as_fitted(fitted_, true);
   int tried = 0;
   for (const EffectGuess& guess : guess_effects(model.fit, model.freedom, motions, everywhere)) {
-    // A factor of all friction beside more of one kind of it may be a factor and more of another kind.
+    // A factor of all friction and more of one kind of friction may also be a factor and more of another
+    // kind.
     if (is_of_term(guess) && model.freedom.rubs_otherwise(guess.effect.joint)) continue;
     if (guess.share < settings.least_at_joint / 2 || tried++ == settings.most_tried) break;
     Candidate c = with(model, guess, everywhere);
@@ -124,7 +125,7 @@ std::optional<Candidate> EffectSteps::other_friction(const Candidate& model, std
 void EffectSteps::drop_what_does_not_explain(const Candidate& model) const {
   if (found_.steps.empty()) return;
   const Candidate last = found_.steps.back();
-  const std::vector<double> expected = fits_.foretold(last, judged_),
+  const std::vector<double> expected = fits_.expected_errors(last, judged_),
                             errors = relative_errors(last.fit, last.freedom, as_fitted(judged_, true), 0);
   const auto left_of = [&](const Candidate& c) {
     const std::size_t joint = c.freedom.effects.back().joint;

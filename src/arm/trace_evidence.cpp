@@ -81,7 +81,7 @@ void bootstrap(Candidate& c, const Squares& s, const ArmTraceSettings& settings)
   c.all = c.gains[joints], c.all_lower = c.lowers[joints];
 }
 
-/// Of unknowns that stand together in a covariance, in the direction in which they are told best.
+/// Standard errors from zero of unknowns with one covariance, in the direction in which they are known best.
 double standard_errors_from_none(const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance,
                                  Eigen::Index place) {
   const Eigen::Index n = values.size();
@@ -97,7 +97,7 @@ constexpr double kFarFromGuess = 0.4;  // of a shape's logarithm; choice: its pr
 
 constexpr double kShapeKnown = 0.25;  // of a shape, its standard error: else it has none; choice
 
-/// Of the rms of what rubs in the drive of its joint, without it.
+/// As a share of the rms friction in the drive of its joint, without the effect.
 double share_of_friction(const Candidate& c, const Motions& judged) {
   double own = 0, all = 0;
   const JointDrive& drive = c.fit.rig.joints[c.joint];
@@ -146,14 +146,14 @@ double errors_from_none(const Candidate& c, const ArmFit& fit) {
     }
     return standard_errors_from_none(e.effect.values.head(e.effect.spec().columns), e.covariance, 0);
   }
-  if (c.freedom.payload)  // of mass and moments together: an arm may tell the moments only
+  if (c.freedom.payload)  // of mass and moments together: an arm may show the moments only
     return standard_errors_from_none(fit.marked().payload.head<4>(), fit.covariance, layout.payload());
   const Eigen::Vector2d tilt(fit.tilt[0].value, fit.tilt[1].value);
   return standard_errors_from_none(tilt, fit.covariance, layout.tilt());
 }
 
 double most_left(const Candidate& c, const ArmTraceSettings& settings) {
-  return is_gain(c.freedom.effects.back().effect) ? settings.explained : settings.foretold;
+  return is_gain(c.freedom.effects.back().effect) ? settings.explained : settings.most_of_expected;
 }
 
 void judge(Candidate& c, const Candidate& without, const Motions& judged, const ArmRig& rig,
@@ -180,7 +180,7 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
   if (const double explained = std::sqrt(c.gain) * error; explained < settings.least_of_signal)
     return fmt::format("explains {:.1f} % of the channel, {:.1f} % are needed", 100 * explained,
                        100 * settings.least_of_signal);
-  // What is gained is its own work, not that the others were fitted anew beside it.
+  // The gain counts what the effect itself does, not that the others were fitted anew beside it.
   Candidate taken_out = c;
   taken_out.fit.effects.back().effect.values.setZero();
   const double with = relative_errors(c.fit, c.freedom, motions, 0)[c.joint],
@@ -207,11 +207,11 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
                        e.effect.shape, slowest);
   const FreeEffect& guess = c.freedom.effects.back();
   if (e.effect.spec().has_shape() && std::fabs(std::log(e.effect.shape / guess.effect.shape)) > kFarFromGuess)
-    return fmt::format("its {} is {:.2g} where the residual had {:.2g}: the records do not tell it",
+    return fmt::format("its {} is {:.2g} where the residual had {:.2g}: the records do not determine it",
                        shape_name(e.effect.spec().shape), e.effect.shape, guess.effect.shape);
   if (const double shape_error = std::sqrt(e.covariance(2, 2));
       e.effect.spec().has_shape() && shape_error > kShapeKnown * e.effect.shape)
-    return fmt::format("its {} is {:.2g} +- {:.1g}: the records do not tell it",
+    return fmt::format("its {} is {:.2g} +- {:.1g}: the records do not determine it",
                        shape_name(e.effect.spec().shape), e.effect.shape, shape_error);
   const double errors = errors_from_none(c, c.fit);
   if (!(errors > settings.sure)) return fmt::format("its size is {:.1f} standard errors from none", errors);
@@ -231,7 +231,7 @@ std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
           c.fit.marked().mass.value, c.fit.marked().mass.standard_error);
   }
   if (c.freedom.tilt) {
-    // A planar arm tells the tilt about one axis only.
+    // A planar arm shows the tilt about one axis only.
     const Eigen::Vector2d tilt(c.fit.tilt[0].value, c.fit.tilt[1].value);
     if (tilt.norm() < settings.least_tilt || !(errors > settings.sure))
       return fmt::format("the tilt is {:.2g} rad, {:.1f} standard errors: no more than a level base has",
@@ -264,13 +264,13 @@ void CandidateFits::try_out(Candidate& c, const Candidate& without, const Motion
       c.freedom.effects.empty() ? refusal(c, rig, settings) : effect_refusal(c, without, judged, settings);
 }
 
-std::vector<double> CandidateFits::foretold(const Candidate& taken, const Motions& judged) const {
+std::vector<double> CandidateFits::expected_errors(const Candidate& taken, const Motions& judged) const {
   const double least = settings.fit.least_seconds;
   ArmFit known = taken.fit;
   for (std::size_t j = 0; !rig.fitted && j < rig.joints.size(); ++j)
     known.deviation[j] = std::fmin(known.deviation[j], base.deviation[j]);
   if (rig.fitted) std::fill(known.deviation.begin(), known.deviation.end(), 0.0);
-  std::vector<double> errors = foretold_errors(known, taken.freedom, as_fitted(judged, true), least);
+  std::vector<double> errors = arm::expected_errors(known, taken.freedom, as_fitted(judged, true), least);
   for (std::size_t j = 0; rig.fitted && j < rig.joints.size(); ++j) {
     const double said = rig.joints[j].training_error;
     errors[j] = std::hypot(errors[j], said > 0 ? said : train_errors[j]);
@@ -278,7 +278,7 @@ std::vector<double> CandidateFits::foretold(const Candidate& taken, const Motion
   if (rig.fitted || taken.freedom.payload || taken.freedom.tilt) return errors;
   // What is missing at a joint where nothing was found, or but one number, makes the fit of the test record
   // unsure: then the training says it.
-  const std::vector<double> trained = foretold_errors(base, {}, as_fitted(judged, false), least);
+  const std::vector<double> trained = arm::expected_errors(base, {}, as_fitted(judged, false), least);
   for (std::size_t j = 0; j < errors.size(); ++j)
     if (std::none_of(taken.freedom.effects.begin(), taken.freedom.effects.end(),
                      [&](const FreeEffect& e) { return e.joint == j && !is_gain(e.effect); }))
@@ -286,14 +286,15 @@ std::vector<double> CandidateFits::foretold(const Candidate& taken, const Motion
   return errors;
 }
 
-double CandidateFits::share_known(const Candidate& told, const Candidate& last, const Motions& judged) const {
-  const std::size_t place = told.freedom.effects.size() - 1, joint = told.freedom.effects.back().joint;
+double CandidateFits::share_known(const Candidate& named, const Candidate& last,
+                                  const Motions& judged) const {
+  const std::size_t place = named.freedom.effects.size() - 1, joint = named.freedom.effects.back().joint;
   Candidate without = last;
   without.fit.effects[place].effect.values.setZero();
   const auto error = [&](const Candidate& c) {
     return relative_errors(c.fit, c.freedom, as_fitted(judged, true), 0)[joint];
   };
-  const double left = error(last), own = error(without), expected = foretold(last, judged)[joint];
+  const double left = error(last), own = error(without), expected = expected_errors(last, judged)[joint];
   const double more = left * left - expected * expected, takes = own * own - left * left;
   return more > 0 && takes > 0 ? std::hypot(settings.law, settings.of_left * std::sqrt(more / takes))
                                : settings.law;

@@ -20,7 +20,7 @@ struct Candidate {
   std::size_t joint = 0;
   double all_lower = 0;  // of the mean of all joints' logarithms, lower end
   double all = 0;
-  std::vector<std::string> alike;  // effects that the last one was not told from
+  std::vector<std::string> alike;  // effects that the last one was not distinguished from
   std::string reason;              // why not; empty: believed
 };
 
@@ -49,8 +49,8 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
 /// to the training records with it.
 class CandidateFits {
  public:
-  CandidateFits(const ArmRig& rig, const Motions& train, const ArmTraceSettings& settings)
-      : rig(rig), settings(settings), train_(train) {}
+  CandidateFits(const ArmRig& arm_rig, const Motions& train, const ArmTraceSettings& trace_settings)
+      : rig(arm_rig), settings(trace_settings), train_(train) {}
 
   /// All that links and drives are fitted to.
   std::vector<FittedMotion> motions(const Motions& fitted) const;
@@ -61,11 +61,11 @@ class CandidateFits {
 
   /// The errors that are expected of it, per joint: what was left of the training records, and what the
   /// effect is not known to. What a half of the test record leaves may be what is missing.
-  std::vector<double> foretold(const Candidate& taken, const Motions& judged) const;
+  std::vector<double> expected_errors(const Candidate& taken, const Motions& judged) const;
 
   /// To what share an effect of a joint is known where its joint is left with more than is expected: what is
-  /// left may have its shape. `told` has it last, `last` what was found after it, too.
-  double share_known(const Candidate& told, const Candidate& last, const Motions& judged) const;
+  /// left may have its shape. `named` has it last, `last` what was found after it, too.
+  double share_known(const Candidate& named, const Candidate& last, const Motions& judged) const;
 
   const ArmRig& rig;
   const ArmTraceSettings& settings;

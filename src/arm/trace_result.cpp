@@ -38,9 +38,9 @@ namespace {
 
 constexpr double kOfUnseen = 0.5;  // of the part that no sample shows, an error; choice, tried on drawn arms
 
-/// No machine's law is that of an effect: sizes and shapes are known to a share of them, and a wave to as
-/// much of a radian in the middle of the joint's motion and, which tells its order, between there and its
-/// ends.
+/// No machine follows the law of an effect exactly: sizes and shapes are known to a share of them, and a wave
+/// to as much of a radian in the middle of the joint's motion and, which limits its order, between there and
+/// its ends.
 void add_error_of_law(std::vector<ArmParameter>& parameters, const FittedEffect& fitted, const ArmRig& rig,
                       double law) {
   const auto add = [](signal::Measured& m, double error) {

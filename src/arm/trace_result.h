@@ -15,8 +15,8 @@ std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked);
 /// Values of an effect with their standard errors; of a wave amplitude and phase.
 std::vector<ArmParameter> effect_parameters(const FittedEffect& fitted);
 
-/// A candidate that is told: the last of its effects of a joint, else what it adds to the chain; values of
-/// a fit that has it, and what was found after it. `law`: the share to which effects of joints are known.
+/// A candidate that is reported: the last of its effects of a joint, else what it adds to the chain; values
+/// of a fit that has it, and what was found after it. `law`: the share to which effects of joints are known.
 ArmStep step_of(const Candidate& c, const ArmFit& fit, const ArmRig& rig, double law);
 
 /// The rig with what the candidate adds to it.
@@ -26,7 +26,7 @@ ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken);
 ArmTrace::Series series_of(const Motions& judged, const ArmFit& base, const FitFreedom& freedom,
                            const ArmFit& fit, bool marked);
 
-/// The record as it is: nothing foretells a joint at rest.
+/// The record as it is: nothing predicts a joint at rest.
 ArmTrace::Series held_series(const ArmRecord& record, record::Channel channel);
 
 /// Noise over the signal's standard deviation, per joint; NaN where `errors` is.

@@ -205,7 +205,7 @@ class Reader {
   HeldJoints held_;
 };
 
-/// What xacro has to do first; without it macros would be left out and nobody would know.
+/// xacro has to run first: else macros would be left out without a word.
 void refuse_xacro(const std::string& text, const std::string& name) {
   std::size_t at = text.find("<xacro:");
   for (std::size_t comment = 0; at != std::string::npos; at = text.find("<xacro:", comment)) {

@@ -13,7 +13,7 @@
 namespace backlash::arm_findings {
 namespace {
 
-/// Of joints with one encoder. What the load tells of the flanks is said by whoever looked at it.
+/// Of joints with one encoder. What the load shows of the flanks is said by whoever looked at it.
 void add_traverses(ArmPlayReport& report, const geared_arm::GearedArm& arm, const arm::ArmRecord& record) {
   const auto alone = [](const record::Record& joint) { return !joint.has(record::Channel::load_position); };
   if (std::none_of(record.joints.begin(), record.joints.end(), alone)) return;

@@ -182,9 +182,9 @@ struct YamlReader::Impl {
   // A map without anything, instead of one that is missing.
   std::shared_ptr<Impl> no_map(const std::string& key) const {
     static const YamlNode kEmpty = [] {
-      YamlNode node;
-      node.kind = Kind::map;
-      return node;
+      YamlNode empty;
+      empty.kind = Kind::map;
+      return empty;
     }();
     auto none = std::make_shared<Impl>();
     none->tree = tree;

@@ -139,7 +139,7 @@ class TreeBuilder : public YAML::EventHandler {
   std::map<YAML::anchor_t, const YamlNode*> anchors_;
 };
 
-// The parser collects all brackets of a line before it tells of the first, so the depth is bounded
+// The parser collects all brackets of a line before it reports the first, so the depth is bounded
 // beforehand. Text with as many brackets that never close is refused too.
 void refuse_many_open_brackets(const std::string& text, const std::string& name) {
   std::size_t depth = 0;

@@ -22,32 +22,32 @@ class ArmChanges {
       : rig_(rig), settings_(settings), progress_(progress) {
     settings_.cutoff = rig.identification.torque_cutoff;
     settings_.position_cutoff = rig.identification.kinematics_cutoff;
-    // The joints share the rate, with two channels each, and the chain is one more.
+    // The joints share the rate of false alarms: two channels each, and one for the chain.
     settings_.false_alarms_per_hour /= double(2 * rig.joints.size() + 1);
   }
 
   Changes run(const std::vector<arm::ArmRecord>& healthy, const arm::ArmRecord& record);
 
  private:
-  void tell(double share, const std::string& phase) const {
+  void report(double share, const std::string& phase) const {
     if (progress_ && !progress_(share, phase)) throw Cancelled();
   }
   // Search
   void search(const arm::ArmRecord& record);
   void take(const FoundChainChange& found, const arm::ArmRecord& record);
   ChainDifference difference_of(const FoundChainChange& found, bool from_beginning, double end) const;
-  void tell_apart(FoundChainChange& of_chain, const ArmJoint& joint, FoundChange& own) const;
+  void name_alike(FoundChainChange& of_chain, const ArmJoint& joint, FoundChange& own) const;
   bool is_of_chain(const ArmJoint& joint, std::size_t place, const FoundChange& next) const;
-  // What is told
-  void tell_pushes(const arm::ArmRecord& record);
-  void tell_joint(const ArmJoint& joint, std::size_t place);
-  void tell_deflection(std::size_t index);
+  // What is reported
+  void report_pushes(const arm::ArmRecord& record);
+  void report_joint(const ArmJoint& joint, std::size_t place);
+  void report_deflection(std::size_t index);
   void add(const std::string& joint, const Changes& one, const ChangeSearch& search,
            const HealthyModel& model);
   void add_constant_error(const ArmJoint& joint, Change& change) const;
   bool is_left_by_chain(const ArmJoint& joint, std::size_t place, const Change& change) const;
   double left(const FoundChainChange& f) const;
-  Change told(const FoundChainChange& f) const;
+  Change change_of(const FoundChainChange& f) const;
   void add_scale();
 
   std::deque<ArmJoint>& joints() { return arm_->joints(); }
@@ -57,7 +57,7 @@ class ArmChanges {
   ChangeSettings settings_;
   const Progress& progress_;
   std::optional<CommissionedArm> arm_;
-  std::vector<FoundChainChange> chain_;    // told
+  std::vector<FoundChainChange> chain_;    // reported
   std::vector<FoundChainChange> earlier_;  // and those that the record has from its beginning
   Changes out_;
 };
@@ -100,11 +100,11 @@ void ArmChanges::take(const FoundChainChange& found, const arm::ArmRecord& recor
   const std::string name = described(found.effect, rig_.chain);
   out_.different.push_back(name);
   out_.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                          ": that is no change within it");
+                          ": it did not change within the record");
 }
 
 /// Each is named beside the other where both explain it alike.
-void ArmChanges::tell_apart(FoundChainChange& of_chain, const ArmJoint& joint, FoundChange& own) const {
+void ArmChanges::name_alike(FoundChainChange& of_chain, const ArmJoint& joint, FoundChange& own) const {
   const double x = of_chain.score.gain, y = own.score.gain;
   const double apart = std::fabs(double(of_chain.from) - double(own.from)) * settings_.block;
   if (std::min(x, y) < settings_.alike * std::max(x, y) || apart > settings_.same_event) return;
@@ -112,10 +112,10 @@ void ArmChanges::tell_apart(FoundChainChange& of_chain, const ArmJoint& joint, F
   own.alike.push_back(described(of_chain.effect, rig_.chain));
 }
 
-/// Whether it is what a change of the chain leaves in a joint: more load rubs more, and shapes are
+/// Whether it is only what a change of the chain leaves in a joint: more load rubs more, and shapes are
 /// idealisations.
 bool ArmChanges::is_of_chain(const ArmJoint& joint, std::size_t place, const FoundChange& next) const {
-  const Change change = joint.search->told(next, joint.found, false);
+  const Change change = joint.search->change_of(next, joint.found, false);
   const double start = joint.motion.start;
   return std::any_of(chain_.begin(), chain_.end(), [&](const FoundChainChange& f) {
     const bool together = change.since_from - settings_.same_event <= start + f.high &&
@@ -126,7 +126,7 @@ bool ArmChanges::is_of_chain(const ArmJoint& joint, std::size_t place, const Fou
   });
 }
 
-/// The clearest first, be it of one joint or of the chain; then what it leaves.
+/// The clearest change first, of one joint or of the chain; then those in what it leaves.
 void ArmChanges::search(const arm::ArmRecord& record) {
   std::deque<ArmJoint>& joints = arm_->joints();
   std::vector<std::optional<FoundChange>> next(joints.size());
@@ -144,7 +144,7 @@ void ArmChanges::search(const arm::ArmRecord& record) {
     std::optional<FoundChainChange> of_chain;
     if (earlier_.size() < static_cast<std::size_t>(settings_.most_changes))
       of_chain = ChainSearch(joints, rig_.chain, settings_).best(earlier_);
-    if (of_chain && clearest < joints.size()) tell_apart(*of_chain, joints[clearest], *next[clearest]);
+    if (of_chain && clearest < joints.size()) name_alike(*of_chain, joints[clearest], *next[clearest]);
     if (of_chain && (clearest == joints.size() || of_chain->score.gain > next[clearest]->score.gain)) {
       take(*of_chain, record);
       stale.assign(joints.size(), 1);
@@ -163,7 +163,7 @@ void ArmChanges::search(const arm::ArmRecord& record) {
   }
 }
 
-void ArmChanges::tell_pushes(const arm::ArmRecord& record) {
+void ArmChanges::report_pushes(const arm::ArmRecord& record) {
   const arm::PushSettings settings;
   for (const arm::PushEvent& e : arm::pushes(record, arm_->fit().rig, settings)) {
     Change change;
@@ -185,8 +185,8 @@ void ArmChanges::tell_pushes(const arm::ArmRecord& record) {
       "nothing else");
 }
 
-/// What no effect explains, where it is small beside a change of the chain: teeth ring and cross the gap
-/// otherwise under another load.
+/// What no effect explains, if it is small beside a change of the chain: under another load teeth ring and
+/// cross the gap in another way.
 bool ArmChanges::is_left_by_chain(const ArmJoint& joint, std::size_t place, const Change& change) const {
   const double noise = joint.model.noise;
   return change.effect == "unknown" &&
@@ -210,14 +210,14 @@ void ArmChanges::add(const std::string& joint, const Changes& one, const ChangeS
   for (const std::string& name : search.different()) {
     out_.different.push_back(named(name));
     out_.warnings.push_back(named("from its beginning the record differs from the healthy ones by " + name +
-                                  ": that is no change within it"));
+                                  ": it did not change within the record"));
   }
   for (const ChangeEffect& e : model.further) out_.healthy_terms.push_back(named(e.name()));
   if (!one.cannot_tell.empty())
     out_.cannot_tell += (out_.cannot_tell.empty() ? "" : "; ") + named(one.cannot_tell);
 }
 
-/// Torques are as well known as the constants that they follow from.
+/// Torques are known no better than the torque constants.
 void ArmChanges::add_constant_error(const ArmJoint& joint, Change& change) const {
   const double relative =
       std::hypot(arm_->fit().rig.common_error, arm_->fit().rig.joints[joint.index].constant_error);
@@ -226,10 +226,11 @@ void ArmChanges::add_constant_error(const ArmJoint& joint, Change& change) const
       s.measured.standard_error = std::hypot(s.measured.standard_error, relative * s.measured.value);
 }
 
-void ArmChanges::tell_joint(const ArmJoint& joint, std::size_t place) {
+void ArmChanges::report_joint(const ArmJoint& joint, std::size_t place) {
   Changes one;
-  for (const FoundChange& f : joint.found) one.changes.push_back(joint.search->told(f, joint.found, false));
-  tell_unexplained(*joint.search, joint.found, false, settings_, one);
+  for (const FoundChange& f : joint.found)
+    one.changes.push_back(joint.search->change_of(f, joint.found, false));
+  report_unexplained(*joint.search, joint.found, false, settings_, one);
   take_out_short(settings_, one);
   std::vector<Change> kept;
   for (Change& c : one.changes) {
@@ -260,7 +261,7 @@ double ArmChanges::left(const FoundChainChange& f) const {
   return std::sqrt(squares / std::max(rows, 1.0));
 }
 
-Change ArmChanges::told(const FoundChainChange& f) const {
+Change ArmChanges::change_of(const FoundChainChange& f) const {
   Change change;
   change.error_before = f.error_before;
   change.error_after = left(f);
@@ -295,7 +296,7 @@ Change ArmChanges::told(const FoundChainChange& f) const {
 }
 
 /// With a second encoder behind the gap.
-void ArmChanges::tell_deflection(std::size_t index) {
+void ArmChanges::report_deflection(std::size_t index) {
   const std::string& name = rig_.joints[index].name;
   try {
     const std::optional<JointDeflection> deflection = arm_->deflection(index);
@@ -306,38 +307,37 @@ void ArmChanges::tell_deflection(std::size_t index) {
                         progress_);
     const std::vector<FoundChange> found = search.run();
     Changes one;
-    for (const FoundChange& f : found) one.changes.push_back(search.told(f, found, false));
-    tell_unexplained(search, found, true, settings_, one);
+    for (const FoundChange& f : found) one.changes.push_back(search.change_of(f, found, false));
+    report_unexplained(search, found, true, settings_, one);
     take_out_short(settings_, one);
     add(name, one, search, model);
   } catch (const CannotIdentify& error) {
-    out_.warnings.push_back("changes of the backlash of " + name + " cannot be told: " + error.what());
+    out_.warnings.push_back("changes of the backlash of " + name + " are not judged: " + error.what());
   }
 }
 
-/// A mass has the scale of the torque constants.
+/// A mass scales with the torque constants.
 void ArmChanges::add_scale() {
   const double common = arm_->fit().rig.common_error;
   if (common > 0 && std::any_of(chain_.begin(), chain_.end(),
                                 [](const FoundChainChange& f) { return f.effect.values > 1; }))
-    out_.warnings.push_back(
-        "the mass has the scale of the torque constants, which all together are known to " +
-        to_text(std::round(1000 * common) / 10) +
-        " %, as its error holds; a known weight measures them (identify --payload)");
+    out_.warnings.push_back("the mass scales with the torque constants, which together are known to " +
+                            to_text(std::round(1000 * common) / 10) +
+                            " % (part of its error); a known weight measures them (identify --payload)");
 }
 
 Changes ArmChanges::run(const std::vector<arm::ArmRecord>& healthy, const arm::ArmRecord& record) {
-  tell(0, "fitting the healthy arm");
+  report(0, "fitting the healthy arm");
   arm_.emplace(rig_, healthy, settings_, progress_, out_.warnings);
   if (arm::holds_pose(record)) {
-    tell_pushes(record);
+    report_pushes(record);
     return out_;
   }
   arm_->read(record, out_);
   search(record);
-  for (std::size_t j = 0; j < joints().size(); ++j) tell_joint(joints()[j], j);
-  for (std::size_t j = 0; j < rig_.joints.size(); ++j) tell_deflection(j);
-  for (const FoundChainChange& f : chain_) out_.changes.push_back(told(f));
+  for (std::size_t j = 0; j < joints().size(); ++j) report_joint(joints()[j], j);
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) report_deflection(j);
+  for (const FoundChainChange& f : chain_) out_.changes.push_back(change_of(f));
   add_scale();
   std::sort(out_.changes.begin(), out_.changes.end(),
             [](const Change& a, const Change& b) { return a.since < b.since; });

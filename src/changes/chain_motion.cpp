@@ -30,8 +30,8 @@ class Interpolated {
   std::size_t at_ = 0;
 };
 
-/// What a joint shows less what is known of it: what is left is inertia of the rotor, offset, dry and viscous
-/// friction, which may differ from day to day.
+/// What a joint shows, without what is known of it. What is left: inertia of the rotor, offset, dry and
+/// viscous friction, which may differ from day to day.
 double own_torque(const arm::JointDrive& drive, double signal, double speed, double sign, double chain) {
   const auto term = [&](DriveTerm t) { return drive.terms[static_cast<std::size_t>(t)]; };
   return drive.constant * signal - chain - term(DriveTerm::quadratic) * speed * std::fabs(speed) -
@@ -56,7 +56,7 @@ void add_rows(const arm::Chain& chain, const arm::ArmMotion& m, std::size_t stri
     for (Eigen::Index s = 0; s < joints; ++s) {
       arm::Joints before = q, after = q;
       before[s] -= kSlipStep, after[s] += kSlipStep;
-      // A joint that stands elsewhere than its encoder shows, by that much less.
+      // The joint stands elsewhere than its encoder shows: that much less.
       const arm::Joints slope =
           (inverse_dynamics(chain, before, v, a) - inverse_dynamics(chain, after, v, a)) / (2 * kSlipStep);
       for (std::size_t j = 0; j < chain.size(); ++j)

@@ -34,7 +34,7 @@ struct ChainMotion {
   std::vector<Eigen::MatrixXd> body, slip;  // per joint: 10 columns per link, one per encoder [N m per unit]
 };
 
-/// By what the chain is another one for a while.
+/// By what the chain differs for a while.
 struct ChainDifference {
   std::size_t joint = 0;
   double from = 0, to = 0;                                 // s of the record

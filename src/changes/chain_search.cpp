@@ -10,7 +10,7 @@
 namespace backlash::changes {
 namespace {
 
-/// What a body that an arm carries is at most, one standard deviation, so that what the motion does not tell
+/// One standard deviation of what a body that an arm carries is at most: what the motion does not show then
 /// stays 0. Choice: the largest arms of this kind carry some 10 kg, half a metre out.
 Eigen::VectorXd largest_body() {
   Eigen::VectorXd sd(10);
@@ -124,7 +124,7 @@ bool ChainSearch::believed(const FoundChainChange& f) const {
   return f.score.gain / (f.inflation * noisier(f)) > threshold;
 }
 
-/// An end, where the record with it is told clearly better: what was taken is put down again.
+/// An end, where the record with it is explained clearly better: what was taken is put down again.
 void ChainSearch::find_end(FoundChainChange& f, const Sums& sums) const {
   FoundChainChange ended = f;
   for (int round = 0; round < 3; ++round) {
@@ -154,8 +154,8 @@ void ChainSearch::set_onset(FoundChainChange& f, const Sums& sums) const {
   f.high = settings_.block * double(high) + least;
 }
 
-/// A body that an arm may carry, or may have lost: its mass is told, and within reach. A slip that is small
-/// enough for its slope to be straight.
+/// A body that an arm may carry or have lost: its mass is known, its centre within reach. A slip is small
+/// enough for its sine to be a straight line.
 bool ChainSearch::plausible(const FoundChainChange& f) const {
   if (f.score.values.size() == 0) return false;
   if (f.effect.values == 1) return std::fabs(f.score.values[0]) < settings_.largest_slip;
@@ -164,12 +164,12 @@ bool ChainSearch::plausible(const FoundChainChange& f) const {
          x.segment(1, 3).norm() < settings_.farthest_centre * std::fabs(x[0]);
 }
 
-/// By which a further value fits noise better than it should: Schwarz 1978, Annals of Statistics 6:461.
+/// By how much a further value fits noise better: Schwarz 1978, Annals of Statistics 6:461.
 double ChainSearch::cost(const FoundChainChange& f) const {
   return double(f.effect.values) * f.inflation * std::log(rows_);
 }
 
-/// Of those that explain it alike one with fewer values, then the one that comes first: the last link.
+/// Of those that explain it alike the one with fewer values, then the first: the last link.
 std::optional<FoundChainChange> ChainSearch::chosen() const {
   std::vector<FoundChainChange> all;
   double most = 0, squares = 0;

@@ -47,7 +47,7 @@ class ChainSearch {
  public:
   ChainSearch(const std::deque<ArmJoint>& joints, const arm::Chain& chain, const ChangeSettings& settings);
 
-  /// The best one beside what is found in the joints and the chain; none where none is believed.
+  /// The best change beside those found in the joints and the chain; none where none is believed.
   std::optional<FoundChainChange> best(const std::vector<FoundChainChange>& found) const;
 
  private:

@@ -50,11 +50,11 @@ double fluctuating_load_rub(const Moment& m, double w0) {
   const double t = std::fabs(m.load), a = m.fluctuation * std::max(0.0, std::fabs(m.speed) - w0);
   return m.direction * (t >= a ? t : (t * t + a * a) / (2 * a));
 }
-/// A joint that stands elsewhere than its encoder shows, by s less, per s: only gravity knows.
+/// A joint stands s less than its encoder shows, per s: only gravity shows that.
 double load_elsewhere(const Moment& m, double s) {
   return s == 0 ? -m.load_slope : ((std::cos(s) - 1) * m.weight - std::sin(s) * m.load_slope) / s;
 }
-/// What is recorded of a torque is more than before.
+/// The recorded torque is larger than before.
 double whole_torque(const Moment& m, double) {
   return m.torque;
 }
@@ -81,7 +81,7 @@ double half_side_drift(const Moment& m, double) {
 double mesh_load(const Moment& m, double) {
   return m.mesh;
 }
-/// A load encoder that shows more makes the deflection less; so does a transmission that runs ahead.
+/// A load encoder that shows more makes the deflection smaller; so does a transmission that runs ahead.
 double less_position(const Moment& m, double) {
   return -m.position;
 }

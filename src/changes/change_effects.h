@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The effects that a record can tell, as columns: the motor torque, or the deflection, that one unit of each
+// The effects that a record can show, as columns: the motor torque, or the deflection, that one unit of each
 // value takes.
 #pragma once
 
@@ -47,20 +47,20 @@ struct ChangeEffect {
   std::string name() const;                           // with its shape
 };
 
-/// Whether who leans on a moving machine shows as this effect, too.
+/// Whether somebody who leans on a moving machine looks like this effect.
 bool may_be_external_torque(const std::string& effect);
 
-/// What is carried weighs and is inert: gravity with a third column. None of other effects.
+/// What is carried has weight and inertia: gravity gets a third column. None for other effects.
 std::optional<ChangeEffect> with_inertia(const ChangeEffect& effect);
 
 /// Simple ones first. Orders whose wave the filter would take away leave columns of nothing.
 std::vector<ChangeEffect> change_effects(const MotionSampling& sampling);
 
-/// Filtered, of the rows that count. Kept with the motion so far as there is room.
+/// Filtered, for the rows that count. Kept with the motion as long as there is room.
 std::shared_ptr<const Eigen::MatrixXd> effect_columns(const SampledMotion& motion,
                                                       const ChangeEffect& effect);
 
-/// The same of many, which are faster together; those that are not kept are left out.
+/// The same for many effects, faster together; those that are not kept are left out.
 void prepare_columns(const SampledMotion& motion, const std::vector<ChangeEffect>& effects);
 
 /// The values of an effect as its equation has them, from those of its columns and their covariance.

@@ -46,20 +46,19 @@ std::string change_summary(const Changes& found) {
     if (c.effect == "unknown")
       text += "; no effect explains it" + (c.alike.empty() ? "" : ", nearest: " + joined(c.alike));
     else if (!c.alike.empty())
-      text += "; the record does not tell it from: " + joined(c.alike);
+      text += "; the record does not distinguish it from: " + joined(c.alike);
     text += "\n";
   }
   if (!found.cannot_tell.empty())
-    text += (text.empty() ? "cannot tell: " : "what else has changed cannot be told: ") + found.cannot_tell +
-            "\n";
+    text +=
+        (text.empty() ? "cannot tell: " : "what else has changed is unknown: ") + found.cannot_tell + "\n";
   if (text.empty())
     text =
         found.unjudged.empty() ? "no change found\n" : "no change found of the joints that could be judged\n";
   for (const Unjudged& u : found.unjudged) text += "not judged: " + u.joint + ": " + u.why + "\n";
   if (!found.different.empty())
-    text +=
-        "from its beginning the record differs from the healthy ones, so that since when cannot be told: " +
-        joined(found.different) + "\n";
+    text += "from its beginning the record differs from the healthy ones, so that the onset is unknown: " +
+            joined(found.different) + "\n";
   return text + fmt::format("{} windows of motion judged\n", found.windows);
 }
 

@@ -77,7 +77,7 @@ EffectSums::Normal EffectSums::normal(std::size_t from, std::size_t to, const Ba
 EffectSums::Score EffectSums::score(const Normal& normal) {
   Score score;
   for (Eigen::Index i = 0; i < normal.own.size(); ++i)
-    if (!(normal.information(i, i) > kToldApart * normal.own[i]) || !(normal.own[i] > 0)) return score;
+    if (!(normal.information(i, i) > kLeastOwn * normal.own[i]) || !(normal.own[i] > 0)) return score;
   score.covariance = normal.information.inverse();
   score.values = score.covariance * normal.moment;
   score.gain = normal.moment.dot(score.values);

@@ -10,7 +10,7 @@
 
 namespace backlash::changes {
 
-constexpr double kToldApart = 1e-3;  // - of its squares that an effect must have for itself. Choice
+constexpr double kLeastOwn = 1e-3;  // - of its squares that an effect must have for itself. Choice
 
 /// What is known beside the effect: residual, nuisances, variance of the noise.
 struct Background {
@@ -23,7 +23,7 @@ struct Background {
 
   void solve();  // `inverse`, `estimate` from the rest
   Eigen::VectorXd left() const { return residual - columns * estimate; }
-  /// What the best values leave, in variances, the price of their own size included: a gain is taken from it.
+  /// What the best values leave, in variances, with the prior's price of their size: a gain is taken from it.
   double misfit() const {
     return (residual.squaredNorm() - (columns.transpose() * residual).dot(estimate)) / variance;
   }
@@ -44,10 +44,10 @@ class EffectSums {
     Eigen::VectorXd values;
     Eigen::MatrixXd covariance;
   };
-  /// From block `from` to before block `to`. No values where the record cannot tell.
+  /// From block `from` to before block `to`. No values where the record does not determine them.
   Score score(std::size_t from, std::size_t to, const Background& background) const;
 
-  /// What that follows from; those of several channels that share the effect's values add up.
+  /// The sums behind a score; those of channels that share the effect's values add up.
   struct Normal {
     Eigen::VectorXd own;          // squares of the columns
     Eigen::MatrixXd information;  // of the values, the nuisances eliminated

@@ -123,7 +123,7 @@ FoundChange ChangeSearch::scanned(const ChangeEffect& e, const Background& b, st
 /// Whether `most` explains a good part of what `f` leaves.
 bool ChangeSearch::leaves_more(const FoundChange& f, const FoundChange& most, const Background& b) const {
   const double more = most.score.gain - f.score.gain;
-  if (more < settings_.told_apart * scores_.inflation(most.effect)) return false;
+  if (more < settings_.distinguished * scores_.inflation(most.effect)) return false;
   double rows = 0;
   left_after(b, most.from, most.to, rows);
   const double left = (b.misfit() - f.score.gain) * rows / double(motion_.size());
@@ -139,12 +139,12 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
   }
   const std::optional<FoundChange> fault = best_fault(b);
   if (fault) all.push_back(*fault);
-  // By what they explain: the inflation of one may be chance.
+  // Compared by what they explain: the inflation of one may be chance.
   const auto most = std::max_element(all.begin(), all.end(), [](const FoundChange& x, const FoundChange& y) {
     return x.score.gain < y.score.gain;
   });
   if (most == all.end() || most->score.values.size() == 0) return std::nullopt;
-  // Of those that explain it alike one with fewer values, unless more values explain what it leaves.
+  // Of those that explain it alike the one with fewer values, unless more values explain what it leaves.
   const double alike = settings_.alike * most->score.gain;
   const FoundChange* simplest = &*most;
   for (const FoundChange& f : all)
@@ -154,13 +154,13 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
   FoundChange found = *simplest;
   found.inflation = scores_.inflation(found.effect);
   found.gain = found.score.gain / found.inflation;
-  // A weak change is told apart from others by noise alone.
-  const double not_told =
-      std::min(alike, most->score.gain - settings_.told_apart * scores_.inflation(most->effect));
+  // A weak change is distinguished from others by noise alone.
+  const double as_likely =
+      std::min(alike, most->score.gain - settings_.distinguished * scores_.inflation(most->effect));
   for (const FoundChange& f : all)
-    if (f.score.gain >= not_told && f.effect.id != found.effect.id) {
-      const bool told = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();
-      if (!told) found.alike.push_back(f.effect.id);
+    if (f.score.gain >= as_likely && f.effect.id != found.effect.id) {
+      const bool listed = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();
+      if (!listed) found.alike.push_back(f.effect.id);
     }
   return found;
 }
@@ -172,7 +172,7 @@ Eigen::VectorXd ChangeSearch::left_with(const FoundChange& f, const Background& 
   return without - b.columns * (b.inverse * (b.columns.transpose() * without / b.variance));
 }
 
-/// Its values where friction may not wander beside it; none where the record cannot tell so.
+/// Its values where friction may not wander beside it; none where the record does not determine them so.
 Eigen::VectorXd ChangeSearch::values_without_wander(const FoundChange& f, const Background& b) const {
   Background steady = b;
   steady.spread.segment(first_.wander, first_.wanders).setConstant(kNone);
@@ -186,7 +186,7 @@ bool ChangeSearch::needs_wander(const FoundChange& f, const Background& b) const
   return without.size() != x.size() || without.dot(x) < settings_.least_steadily * x.squaredNorm();
 }
 
-/// Growth of friction as a healthy machine may have it; what is quicker than its wander looks larger than it
+/// Growth of friction that a healthy machine may have. Growth faster than its wander looks larger than it
 /// is.
 bool ChangeSearch::is_drift(const FoundChange& f) const {
   const double span = settings_.block * double(f.to - f.from);
@@ -203,10 +203,10 @@ bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   if (torque && ((f.effect.ramp && is_drift(f)) || needs_wander(f, b))) return false;
   if (explained < settings_.least_explained * squares) return false;
   if (explained < rows * model_.least_change * model_.least_change) return false;
-  // More noise than in the healthy records counts against it.
+  // More noise than in the healthy records lowers the gain.
   const double all = b.left().squaredNorm(), left = std::max(all - explained, 0.0);
   const double noisier = std::max(1.0, left / double(motion_.size()) / b.variance);
-  // And so does noise that follows the effect for as long as a window.
+  // So does noise that follows the effect for a whole window.
   const Eigen::VectorXd beside = left_with(f, b);
   const double own =
       score_inflation(motion_, beside, *effect_columns(motion_, f.effect), b.variance, settings_.window);
@@ -246,7 +246,7 @@ void ChangeSearch::refine(FoundChange& f, const Background& b) const {
   f.gain = f.score.gain / f.inflation;
 }
 
-/// A payload is inert as well: where the record shows it, gravity alone would have a wrong size.
+/// A payload has inertia as well: where the record shows it, gravity alone would get a wrong size.
 void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
   const std::optional<ChangeEffect> e = with_inertia(f.effect);
   if (!e) return;
@@ -285,7 +285,7 @@ bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChang
   });
 }
 
-/// A change that another takes back later, the same effect with the opposite value, is one with an end.
+/// A change that a later one takes back (same effect, opposite value) is one change with an end.
 void ChangeSearch::unite(std::vector<FoundChange>& found) const {
   for (FoundChange& f : found)
     for (auto later = found.begin(); later != found.end(); ++later) {
@@ -328,7 +328,7 @@ std::optional<FoundChange> ChangeSearch::next(const std::vector<FoundChange>& fo
 
 void ChangeSearch::add(FoundChange next, std::vector<FoundChange>& found) const {
   found.push_back(std::move(next));
-  // Each anew beside the others.
+  // Each is estimated anew beside the others.
   for (std::size_t i = 0; found.size() > 1 && i < found.size(); ++i) {
     std::vector<FoundChange> others = found;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
@@ -347,7 +347,7 @@ std::vector<FoundChange> ChangeSearch::run() {
   return found;
 }
 
-Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& all, bool linear) const {
+Change ChangeSearch::change_of(const FoundChange& f, const std::vector<FoundChange>& all, bool linear) const {
   std::vector<FoundChange> others;
   for (const FoundChange& o : all)
     if (o.from != f.from || o.effect.name() != f.effect.name()) others.push_back(o);
@@ -358,7 +358,7 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
   change.gain = f.gain;
   onset_interval(f, sums_of(f, b), b, change);
   onset_with_left(f, b, change);
-  // Changes of one event hold each other's onset.
+  // Intervals of changes of one event contain each other's onset.
   for (const FoundChange& o : others)
     if (std::fabs(double(o.from) - double(f.from)) * settings_.block < settings_.same_event) {
       change.since_from -= settings_.same_event / 2;
@@ -372,7 +372,7 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
   change.error_after = std::sqrt(after);
   Eigen::VectorXd values = f.score.values;
   Eigen::MatrixXd covariance = f.score.covariance * f.inflation * std::max(1.0, after / b.variance);
-  // How friction wanders is not known either.
+  // The wander of friction is not known either.
   if (const Eigen::VectorXd without = values_without_wander(f, b); without.size() == values.size())
     covariance.diagonal() += (without - values).cwiseAbs2();
   const Eigen::Index wave = std::min<Eigen::Index>(values.size(), 2);

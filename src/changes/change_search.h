@@ -32,8 +32,8 @@ class ChangeSearch {
                const ChangeSettings& settings, const Progress& progress);
 
   std::vector<FoundChange> run();
-  /// The best change beside those that were found, if it is believed; what the record has from its beginning
-  /// is from then on no change.
+  /// The best change beside those that were found, if it is believed. What the record has from its beginning
+  /// is no change from then on.
   std::optional<FoundChange> next(const std::vector<FoundChange>& found);
   void add(FoundChange next, std::vector<FoundChange>& found) const;
   Background background(const std::vector<FoundChange>& others) const;
@@ -42,11 +42,11 @@ class ChangeSearch {
   std::size_t blocks() const { return blocks_; }
   double threshold(Eigen::Index values) const;
   std::size_t windows() const;
-  Change told(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
+  Change change_of(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
   bool explained(const std::vector<FoundChange>& all) const;
-  /// A change is there of which a fault at one place is the nearest, and others have a share in it.
+  /// There is a change most like a fault at one place, in which other effects have a share.
   bool like_fault() const { return like_fault_; }
-  /// What is left beside these is louder than the healthy machine.
+  /// What is left beside these is louder than the healthy machine leaves.
   std::optional<LoudStretch> loud(const std::vector<FoundChange>& all) const;
   /// The same over the rest of the record, in motion alike.
   std::optional<LoudStretch> louder(const std::vector<FoundChange>& all) const;
@@ -57,7 +57,9 @@ class ChangeSearch {
 
  private:
   std::vector<double> times() const;
-  std::vector<double> squares_over_healthy(const std::vector<FoundChange>& all) const;
+  /// `apart`: what is left there is of another variance, and determines the values of the rest as little.
+  std::vector<double> squares_over_healthy(const std::vector<FoundChange>& all,
+                                           const std::optional<LoudStretch>& apart = std::nullopt) const;
   Eigen::MatrixXd found_columns(const FoundChange& f) const;
   std::optional<FoundChange> best(const Background& b) const;
   bool leaves_more(const FoundChange& f, const FoundChange& most, const Background& b) const;
@@ -105,7 +107,7 @@ class ChangeSearch {
   Eigen::Index beside_column_ = 0, beside_columns_ = 0;  // the first of what stands beside, and how many
   std::vector<std::string> different_;                   // effects that the record has from its beginning
   bool like_fault_ = false;
-  std::optional<FoundChange> left_by_shape_;  // the likeliest beside those found, too little to be told
+  std::optional<FoundChange> left_by_shape_;  // the likeliest beside those found, too little to be reported
   const std::size_t margin_, blocks_;
 };
 

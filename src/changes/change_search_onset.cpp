@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Of the search for changes what is about their begin and end.
+// The part of the search for changes that finds where they begin and end.
 #include <algorithm>
 #include <cmath>
 
@@ -17,7 +17,7 @@ void ChangeSearch::refine_onset(FoundChange& f, const EffectSums& sums, const Ba
   }
 }
 
-/// An end, where the record with it is told clearly better.
+/// An end, where the record with it is explained clearly better.
 void ChangeSearch::find_end(FoundChange& f, const Background& b) const {
   const EffectSums sums = sums_of(f, b);
   FoundChange ended = f;
@@ -45,7 +45,7 @@ bool ChangeSearch::begins_before(const FoundChange& f, const Background& b) cons
 void ChangeSearch::onset_interval(const FoundChange& f, const EffectSums& sums, const Background& b,
                                   Change& change) const {
   double rows = 0;
-  // What the shape of the effect leaves widens it like noise.
+  // What the shape of the effect leaves widens the interval like noise.
   const double squares = left_after(b, f.from, f.to, rows) - f.score.gain * b.variance;
   const double noisier = std::max(1.0, squares / std::max(rows, 1.0) / b.variance);
   const double drop = settings_.onset_drop * f.inflation * noisier;
@@ -63,8 +63,8 @@ void ChangeSearch::onset_interval(const FoundChange& f, const EffectSums& sums, 
   change.since_to = motion_.start + settings_.block * double(high) + settings_.block + settings_.onset_least;
 }
 
-/// The onset of a change whose shape leaves something, or that comes with another too small to be told: of
-/// both together, and by itself.
+/// The onset of a change whose shape leaves something, or that comes with a second, too small to be reported:
+/// estimated with both together, and with one.
 void ChangeSearch::onset_with_left(const FoundChange& f, const Background& b, Change& change) const {
   if (!left_by_shape_ || f.effect.ramp || left_by_shape_->effect.ramp) return;
   const double apart = std::fabs(double(left_by_shape_->from) - double(f.from)) * settings_.block;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Of the search for changes what is about faults at one place, and effects of a speed or a way that is
+// The part of the search for changes that finds faults at one place, and effects with a speed or way that is
 // fitted.
 #include <Eigen/Dense>
 #include <algorithm>
@@ -25,7 +25,7 @@ constexpr double kOthers =
 
 }  // namespace
 
-/// The likeliest fault of one place, if passes tell it.
+/// The likeliest fault of one place, if passes show it.
 std::optional<FoundChange> ChangeSearch::best_fault(const Background& b) const {
   std::optional<FoundChange> best;
   const double least = threshold(2);
@@ -80,7 +80,7 @@ void ChangeSearch::refine_scale(FoundChange& f, const Background& b) const {
       }
 }
 
-/// Columns that are right for a slip of that size: gravity is no straight line.
+/// Columns for a slip of that size: gravity is no straight line.
 void ChangeSearch::refine_slip(FoundChange& f, const Background& b) const {
   if (!f.effect.is_slip() || motion_.sampling.channel != ChangeChannel::torque) return;
   for (int round = 0; round < kRounds && f.score.values.size() > 0; ++round) {
@@ -94,7 +94,7 @@ void ChangeSearch::refine_slip(FoundChange& f, const Background& b) const {
   }
 }
 
-/// With what the scale may be other by: its slope stands beside.
+/// With an unknown scale: its slope is one more column.
 std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Background& b, double noisier,
                                                   bool linear) const {
   ChangeEffect more = f.effect, less = f.effect;
@@ -105,7 +105,7 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
   both << z,
       f.score.values[0] / (2 * kSlope) * (*effect_columns(motion_, more) - *effect_columns(motion_, less));
   const EffectSums::Score s = EffectSums(motion_, both, b, settings_.block, false).score(f.from, f.to, b);
-  Eigen::Matrix2d covariance = Eigen::Vector2d(f.score.values.squaredNorm(), 1).asDiagonal();  // not told
+  Eigen::Matrix2d covariance = Eigen::Vector2d(f.score.values.squaredNorm(), 1).asDiagonal();  // not known
   if (s.values.size() == 2) covariance = s.covariance * f.inflation * std::max(1.0, noisier);
   covariance(0, 0) += std::pow(settings_.model_error * f.score.values[0], 2);
   std::vector<ChangeSize> size =
@@ -117,7 +117,7 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
   return size;
 }
 
-/// Told by passes through its place without the one that says most: a push is at one place as well.
+/// Passes show it even without the one that shows most: a push is at one place as well.
 bool ChangeSearch::repeats(const FoundChange& f, const Background& b) const {
   const double from = settings_.block * double(f.from), to = settings_.block * double(f.to);
   return f.effect.width < screen_.widest() &&
@@ -156,7 +156,7 @@ std::vector<ChangeSize> ChangeSearch::fault_size(const FoundChange& f, const Bac
   const double model[] = {f.score.values.norm(), f.score.values.norm(), f.effect.width, f.effect.width};
   const auto error = [&](Eigen::Index i) {
     const double own = kShape * model[i];
-    if (whole.values.size() == 0) return model[i];  // the record does not tell place and width
+    if (whole.values.size() == 0) return model[i];  // the record does not determine place and width
     return std::sqrt(whole.covariance(i, i) * f.inflation * noisier + own * own);
   };
   const std::string unit = model::axis_unit(channel == ChangeChannel::torque ? "N m" : "rad", linear);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Of the search for changes what is about the part of a record that no effect explains.
+// The part of the search for changes that deals with what no effect explains.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,15 @@
 
 namespace backlash::changes {
 
+namespace {
+
+constexpr int kMostTurns = 10;  // choice: two or three are usual
+
+}  // namespace
+
 bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
   if (all.empty()) return !like_fault_;
-  // So many at once are rather one of another shape.
+  // So many at once are rather one change of another shape.
   if (all.size() >= static_cast<std::size_t>(settings_.most_changes)) return false;
   std::size_t from = blocks_;
   for (const FoundChange& f : all) from = std::min(from, f.from);
@@ -29,11 +35,22 @@ std::vector<double> ChangeSearch::times() const {
   return times;
 }
 
-std::vector<double> ChangeSearch::squares_over_healthy(const std::vector<FoundChange>& all) const {
-  const Background b = background(all);
+std::vector<double> ChangeSearch::squares_over_healthy(const std::vector<FoundChange>& all,
+                                                       const std::optional<LoudStretch>& apart) const {
+  Background b = background(all);
+  if (apart) {
+    Background weighted = b;
+    for (Eigen::Index r = 0; r < motion_.size(); ++r) {
+      if (motion_.time(r) < apart->from || (!apart->to_end && motion_.time(r) >= apart->to)) continue;
+      weighted.residual[r] /= std::sqrt(apart->times);
+      weighted.columns.row(r) /= std::sqrt(apart->times);
+    }
+    weighted.solve();
+    b.estimate = weighted.estimate;
+  }
   const Eigen::VectorXd left = b.left();
   Eigen::VectorXd expected = expected_squares(model_, motion_);
-  // What stands beside is as well known as its shape.
+  // What was found before is known only as well as its shape.
   const Eigen::VectorXd beside = b.columns.middleCols(beside_column_, beside_columns_) *
                                  b.estimate.segment(beside_column_, beside_columns_);
   expected += (settings_.model_error * beside).cwiseAbs2();
@@ -42,7 +59,15 @@ std::vector<double> ChangeSearch::squares_over_healthy(const std::vector<FoundCh
 }
 
 std::optional<LoudStretch> ChangeSearch::loud(const std::vector<FoundChange>& all) const {
-  return loud_stretch(times(), squares_over_healthy(all), settings_);
+  std::optional<LoudStretch> loud = loud_stretch(times(), squares_over_healthy(all), settings_);
+  // Friction that may wander follows what is loud, and leaves the time before as loud as that: both are
+  // searched for in turn until neither moves.
+  for (int i = 0; loud && i < kMostTurns; ++i) {
+    const std::optional<LoudStretch> next = loud_stretch(times(), squares_over_healthy(all, loud), settings_);
+    if (!next || (next->from == loud->from && next->to == loud->to)) break;
+    loud = next;
+  }
+  return loud;
 }
 
 std::optional<LoudStretch> ChangeSearch::louder(const std::vector<FoundChange>& all) const {

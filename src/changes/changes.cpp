@@ -17,10 +17,11 @@ namespace {
 struct ChannelChanges {
   std::vector<FoundChange> found;
   std::vector<signal::Measured> beside;  // columns of what stood beside
-  Changes told;
+  Changes reported;
 };
 
-/// What the load of the teeth may be other by: what the motor's torque shows, on whichever side of the gap.
+/// By how much the load of the teeth may have changed: what the motor's torque shows, on either side of the
+/// gap.
 std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& changes, double block) {
   if (changes.empty()) return {};
   return [changes, block](const Moment& m) {
@@ -47,18 +48,18 @@ ChannelChanges changes_in(const HealthyModel& model, const record::Record& recor
   ChannelChanges result;
   const std::vector<FoundChange>& found = result.found = search.run();
   result.beside = search.beside(found);
-  Changes& out = result.told;
+  Changes& out = result.reported;
   out.windows = search.windows();
   out.threshold = search.threshold(1);
   out.noise = model.noise;
   for (const ChangeEffect& e : model.further) out.healthy_terms.push_back(e.name());
-  for (const FoundChange& f : found) out.changes.push_back(search.told(f, found, linear));
-  tell_unexplained(search, found, model.sampling.mesh.has_value(), settings, out);
+  for (const FoundChange& f : found) out.changes.push_back(search.change_of(f, found, linear));
+  report_unexplained(search, found, model.sampling.mesh.has_value(), settings, out);
   take_out_short(settings, out);
   out.different = search.different();
   for (const std::string& name : search.different())
     out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                           ": that is no change within it");
+                           ": it did not change within the record");
   for (const DifferentValue& value : different_values(model, search.background(found), linear)) {
     if (std::find(out.different.begin(), out.different.end(), value.name) != out.different.end()) continue;
     out.different.push_back(value.name);
@@ -72,16 +73,18 @@ ChannelChanges changes_in(const HealthyModel& model, const record::Record& recor
 double share_behind(const model::Rig& rig) {
   if (!model::has_two_inertias(rig))
     throw CannotIdentify(
-        "changes are told of machines of one inertia (mesh: rigid) and of two (rigid couplings, a free "
-        "link)");
+        "the rig file declares neither one inertia (mesh: rigid) nor two (rigid couplings, a free link): "
+        "changes are found of these only");
   if (rig.motor_side && rig.reduction_ratio != 1)
-    throw CannotIdentify("changes of two inertias are told from records at the load's side of the reduction");
+    throw CannotIdentify(
+        "the record is at the motor's side of the reduction: changes of two inertias are found "
+        "in records at the load's side only");
   const double behind = rig.gear.inertia + rig.output_coupling.inertia + rig.link.inertia;
   return behind / (rig.motor.inertia + rig.input_coupling.inertia + rig.pinion.inertia + behind);
 }
 
-/// On which side of the gap friction is that the motor's torque shows as another: behind it, it loads the
-/// teeth and deflects them by `compliance`. 1: behind, 0: before; NaN: not told.
+/// On which side of the gap friction has changed, by the motor's torque: friction behind the gap loads the
+/// teeth and deflects them by `compliance`. 1: behind, 0: before; NaN: not known.
 double side_of(const signal::Measured& torque, const signal::Measured& deflection, double compliance,
                const ChangeSettings& settings) {
   const double all = compliance * torque.value, share = deflection.value / all;
@@ -90,9 +93,9 @@ double side_of(const signal::Measured& torque, const signal::Measured& deflectio
   return std::fabs(share - side) + error < settings.worst_side ? side : kNaN;
 }
 
-/// Names friction by its side of the gap; where that is not told, both are named.
-void tell_sides(const ChannelChanges& torque, const ChannelChanges* deflection, double compliance,
-                const ChangeSettings& settings, Changes& told) {
+/// Names friction by its side of the gap; where that is not known, both are named.
+void name_sides(const ChannelChanges& torque, const ChannelChanges* deflection, double compliance,
+                const ChangeSettings& settings, Changes& all) {
   constexpr std::pair<const char*, const char*> kSides[] = {{"motor_coulomb", "load_coulomb"},
                                                             {"motor_viscous", "load_viscous"}};
   std::size_t column = 0;
@@ -100,7 +103,7 @@ void tell_sides(const ChannelChanges& torque, const ChannelChanges* deflection, 
     const std::size_t at = column;
     column += f.effect.ramp ? 1 : f.effect.columns.size();
     for (const auto& [before, behind] : kSides)
-      for (Change& c : told.changes) {
+      for (Change& c : all.changes) {
         if (f.effect.id != before || c.effect != before || c.size.empty() || c.gain != f.gain) continue;
         const double side =
             deflection ? side_of(c.size[0].measured, deflection->beside[at], compliance, settings) : kNaN;
@@ -120,17 +123,17 @@ void add_deflection(const Changes& more, Changes& all) {
   all.cannot_tell += more.cannot_tell;
 }
 
-/// What one channel cannot name while the other names it, or cannot either, is told once.
+/// A change that one channel cannot name is reported once, whether the other names it or not.
 void unite_unknown(const ChangeSettings& settings, Changes& all) {
   std::vector<Change> kept;
   for (std::size_t i = 0; i < all.changes.size(); ++i) {
     const Change& c = all.changes[i];
-    const auto told_by = [&](const Change& o) {
+    const auto same_event = [&](const Change& o) {
       const bool together = o.since_from - settings.same_event <= c.since_to &&
                             c.since_from - settings.same_event <= o.since_to;
       return together && (o.effect != "unknown" || &o < &c);
     };
-    const auto other = std::find_if(all.changes.begin(), all.changes.end(), told_by);
+    const auto other = std::find_if(all.changes.begin(), all.changes.end(), same_event);
     if (c.effect != "unknown" || other == all.changes.end())
       kept.push_back(c);
     else if (other->effect != "unknown")
@@ -140,7 +143,7 @@ void unite_unknown(const ChangeSettings& settings, Changes& all) {
   all.changes = kept;
 }
 
-/// Two inertias: the torque first, whose changes may load the teeth otherwise; then the deflection.
+/// Two inertias: the torque first, as its changes may change the load of the teeth; then the deflection.
 Changes changes_of_two(const model::Rig& rig, double behind, const std::vector<record::Record>& healthy,
                        const record::Record& record, MotionSampling sampling, ChangeSettings settings,
                        const Progress& progress) {
@@ -156,21 +159,21 @@ Changes changes_of_two(const model::Rig& rig, double behind, const std::vector<r
     return changes_in(model, record, beside, rig.linear, settings, progress);
   };
   const ChannelChanges torque = search(commission_healthy(healthy, sampling, settings), {});
-  Changes all = torque.told;
+  Changes all = torque.reported;
   if (!load) {
-    tell_sides(torque, nullptr, kNaN, settings, all);
-    all.warnings.emplace_back("without load_position changes of the backlash cannot be told");
+    name_sides(torque, nullptr, kNaN, settings, all);
+    all.warnings.emplace_back("without load_position changes of the backlash are not judged: record it");
     return all;
   }
   sampling.channel = ChangeChannel::deflection;
   try {
     const HealthyModel model = commission_healthy(healthy, sampling, settings);
     const ChannelChanges deflection = search(model, torque.found);
-    tell_sides(torque, &deflection, compliance_of(model), settings, all);
-    add_deflection(deflection.told, all);
+    name_sides(torque, &deflection, compliance_of(model), settings, all);
+    add_deflection(deflection.reported, all);
   } catch (const CannotIdentify& error) {
-    tell_sides(torque, nullptr, kNaN, settings, all);
-    all.warnings.push_back("changes of the backlash cannot be told: " + std::string(error.what()));
+    name_sides(torque, nullptr, kNaN, settings, all);
+    all.warnings.push_back("changes of the backlash are not judged: " + std::string(error.what()));
   }
   return all;
 }
@@ -187,7 +190,7 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
   Changes out;
   if (rig.mesh.rigid) {
     const HealthyModel model = commission_healthy(healthy, sampling, settings);
-    out = changes_in(model, record, {}, rig.linear, settings, progress).told;
+    out = changes_in(model, record, {}, rig.linear, settings, progress).reported;
   } else {
     out = changes_of_two(rig, behind, healthy, record, sampling, settings, progress);
     unite_unknown(settings, out);

@@ -21,10 +21,10 @@ constexpr int kMostRefinements =
 constexpr std::size_t kFewest = 4;   // stretches that must fit. Choice
 constexpr double kLeftByName = 0.2;  // of what all values together explain, that a name may leave. Choice
 constexpr double kSureOfLeft = 0.999;  // chance that the others together explain no more than this of nothing
-constexpr double kMostUnexplained = 1.0 / 3;   // of the stretches, beside those that are told. Choice
+constexpr double kMostUnexplained = 1.0 / 3;   // of the stretches, beside those that are reported. Choice
 constexpr std::size_t kFewestUnexplained = 3;  // in a row, that are a change. Choice: one may be odd
 
-/// Stretches with no machine in a row, and what is before them.
+/// Stretches in a row that no machine explains, and what is before them.
 struct UnknownRun {
   std::size_t first = 0, last = 0;
 };
@@ -42,7 +42,7 @@ class RigChanges {
       if (!next) break;
       fit({*next});
     }
-    return told();
+    return result();
   }
 
  private:
@@ -67,8 +67,8 @@ class RigChanges {
     std::string reason;
     for (const FittedStretch& s : all_)
       if (!s.reason.empty()) reason = ": " + s.reason;
-    throw CannotIdentify(fmt::format("{}: {} of {} stretches tell the machine, {} are needed{}", record_.name,
-                                     out.size(), all_.size(), kFewest, reason));
+    throw CannotIdentify(fmt::format("{}: {} of {} stretches determine the machine, {} are needed{}",
+                                     record_.name, out.size(), all_.size(), kFewest, reason));
   }
 
   RigScan scan() const {
@@ -118,7 +118,7 @@ class RigChanges {
     return best;
   }
 
-  /// Of a gain its change.
+  /// The change that a gain stands for.
   std::vector<ChangeSize> size_of(const RigChange& c) const {
     const RigEffect& effect = rig_.effects[c.effect];
     const bool gap = effect.value == 0;
@@ -148,7 +148,7 @@ class RigChanges {
     return out;
   }
 
-  Change told(const RigScan& scan, const RigChange& c, const std::vector<RigChange>& others) const {
+  Change change_of(const RigScan& scan, const RigChange& c, const std::vector<RigChange>& others) const {
     Change change;
     change.gain = c.gain;
     change.since = c.shape.since;
@@ -174,7 +174,7 @@ class RigChanges {
   }
 
   /// Stretches in a row that no machine explains.
-  void tell_unknown(Changes& out) const {
+  void report_unknown(Changes& out) const {
     for (const UnknownRun& r : unknown_runs()) {
       const FittedStretch& first = all_[r.first];
       if (r.first == 0) {
@@ -192,17 +192,17 @@ class RigChanges {
     }
   }
 
-  /// What was not judged is no health.
-  void tell_left(Changes& out) const {
+  /// A stretch that was not judged is not healthy.
+  void report_unjudged(Changes& out) const {
     std::size_t left = 0, count = 0;
     std::string reason;
     for (const FittedStretch& s : all_) {
-      const auto told = [&](const Change& c) {
+      const auto covers = [&](const Change& c) {
         const bool within =
             c.effect == "unknown" && s.at.from >= c.since_from && (!c.until || s.at.to <= *c.until);
         return within || (s.at.to >= c.since_from && s.at.from <= c.since_to);  // it may hold the onset
       };
-      if (std::any_of(out.changes.begin(), out.changes.end(), told)) continue;
+      if (std::any_of(out.changes.begin(), out.changes.end(), covers)) continue;
       ++count;
       if (s.judged) continue;
       ++left, reason = s.reason;
@@ -221,13 +221,13 @@ class RigChanges {
     for (const Change& c : out.changes)
       if (is_short(c) && out.cannot_tell.empty())
         out.cannot_tell = fmt::format(
-            "from {:.1f} to {:.1f} s the record differs from the healthy ones, too short to tell by what "
+            "from {:.1f} to {:.1f} s the record differs from the healthy ones, too short to say by what "
             "(nearest: {})",
             c.since, *c.until, c.effect);
     out.changes.erase(std::remove_if(out.changes.begin(), out.changes.end(), is_short), out.changes.end());
   }
 
-  Changes told() const {
+  Changes result() const {
     const RigScan s = scan();
     const RigScan::Found found = s.run();
     Changes out;
@@ -235,12 +235,12 @@ class RigChanges {
     out.threshold = s.threshold();
     out.noise = rig_.residual[0];
     for (std::size_t i = 0; i < found.changes.size(); ++i)
-      out.changes.push_back(told(s, found.changes[i], found.beside(i)));
+      out.changes.push_back(change_of(s, found.changes[i], found.beside(i)));
     for (const RigChange& d : found.different) {
       const std::string& name = rig_.effects[d.effect].name;
       out.different.push_back(name);
       out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                             ": that is no change within it");
+                             ": it did not change within the record");
     }
     if (const auto unexplained = s.unexplained(found)) {
       const std::string text =
@@ -248,8 +248,8 @@ class RigChanges {
                       unexplained->since);
       (out.changes.empty() ? out.cannot_tell : out.warnings.emplace_back()) = text;
     }
-    tell_unknown(out);
-    tell_left(out);
+    report_unknown(out);
+    report_unjudged(out);
     take_out_short(out);
     std::sort(out.changes.begin(), out.changes.end(),
               [](const Change& a, const Change& b) { return a.since < b.since; });
@@ -302,9 +302,8 @@ Changes detect_changes(const rig_file::RigFile& file, const std::vector<record::
   if (file.diagnosis.waveform)
     return changes_of_rig(*file.diagnosis.waveform, healthy, record, settings, progress);
   throw CannotIdentify(
-      "changes are told of machines of one inertia (mesh: rigid), of two (rigid couplings, a free link), and "
-      "of "
-      "a pinion with a torque sensor; of this one they are not, as " +
+      "the rig file declares neither one inertia (mesh: rigid) nor two (rigid couplings, a free link) nor a "
+      "pinion with a torque sensor: changes are found of these only; " +
       why_not(file));
 }
 

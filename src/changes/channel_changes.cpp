@@ -20,8 +20,8 @@ double rounded(double x) {
 
 /// Where the record is louder than the healthy machine. Of two inertias another task alone may do that, up to
 /// a limit: their teeth cross the gap more often or harder.
-void tell_loud(const ChangeSearch& search, const LoudStretch& loud, std::vector<std::string> nearest,
-               bool of_two, const ChangeSettings& settings, Changes& out) {
+void report_loud(const ChangeSearch& search, const LoudStretch& loud, std::vector<std::string> nearest,
+                 bool of_two, const ChangeSettings& settings, Changes& out) {
   Change unknown = search.unknown(loud);
   if (!loud.from_beginning && (!of_two || loud.times >= settings.unknown_of_two)) {
     unknown.alike = std::move(nearest);
@@ -37,10 +37,10 @@ void tell_loud(const ChangeSearch& search, const LoudStretch& loud, std::vector<
       "motion of this kind";
 }
 
-/// Where it is louder than in the rest, though less than that. More than the changes explain is no shape of
-/// theirs.
-void tell_louder(const ChangeSearch& search, const std::vector<FoundChange>& found, double explained,
-                 Changes& out) {
+/// Where it is louder than in the rest, but less than that. More than the changes explain is not their
+/// shape.
+void report_louder(const ChangeSearch& search, const std::vector<FoundChange>& found, double explained,
+                   Changes& out) {
   const std::optional<LoudStretch> louder = search.louder(found);
   if (!louder || louder->excess < explained) return;
   const Change unknown = search.unknown(*louder);
@@ -56,8 +56,8 @@ void tell_louder(const ChangeSearch& search, const std::vector<FoundChange>& fou
 
 }  // namespace
 
-void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
-                      const ChangeSettings& settings, Changes& out) {
+void report_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
+                        const ChangeSettings& settings, Changes& out) {
   std::optional<LoudStretch> loud = search.loud(found);
   double explained = 0;
   std::vector<std::string> nearest;
@@ -71,15 +71,15 @@ void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>
       out.warnings.push_back("since " + whole_seconds(search.unknown(*loud).since) +
                              " the record follows no effect, beside " + joined(nearest));
     else if (loud)
-      tell_loud(search, *loud, {}, of_two, settings, out);
+      report_loud(search, *loud, {}, of_two, settings, out);
     else
-      tell_louder(search, found, explained, out);
+      report_louder(search, found, explained, out);
     return;
   }
   out.changes.clear();
   loud = search.loud({});
   if (loud)
-    tell_loud(search, *loud, nearest, of_two, settings, out);
+    report_loud(search, *loud, nearest, of_two, settings, out);
   else
     out.cannot_tell = "the record differs from the healthy ones in a way that no effect explains (nearest: " +
                       joined(nearest) + "): commission with more motion of this kind";
@@ -92,7 +92,7 @@ void take_out_short(const ChangeSettings& settings, Changes& out) {
     if (is_short(c) && out.cannot_tell.empty())
       out.cannot_tell =
           "from " + whole_seconds(c.since) + " to " + whole_seconds(*c.until) +
-          " the record differs from the healthy ones, too short to tell by what (nearest: " + c.effect + ")";
+          " the record differs from the healthy ones, too short to say by what (nearest: " + c.effect + ")";
   out.changes.erase(std::remove_if(out.changes.begin(), out.changes.end(), is_short), out.changes.end());
 }
 

@@ -38,7 +38,7 @@ MotionSampling CommissionedArm::sampling_of_joint(std::size_t index) const {
   return sampling;
 }
 
-/// A joint rests while others move: the healthy records in which it moves.
+/// The healthy records in which this joint moves: it rests while others move.
 std::vector<record::Record> CommissionedArm::long_enough(std::size_t index,
                                                          const MotionSampling& sampling) const {
   std::vector<record::Record> all;
@@ -110,11 +110,11 @@ void CommissionedArm::read(const arm::ArmRecord& record, Changes& out) {
   throw CannotIdentify("no joint can be judged: " + joined(all));
 }
 
-/// What the arm carries loads its gears too, and a joint that stands elsewhere bears another load.
+/// What the arm carries loads its gears too, and in another position a joint bears another load.
 void CommissionedArm::differ(const ChainDifference& difference, const arm::ArmRecord& record) {
   differences_.push_back(difference);
-  std::vector<std::string> told_before;
-  record_ = chain_motion(fit_, record, differences_, settings_.most_rate, told_before);
+  std::vector<std::string> reported_before;
+  record_ = chain_motion(fit_, record, differences_, settings_.most_rate, reported_before);
   for (ArmJoint& joint : joints_) {
     joint.motion = motion_by(joint.model, record_.joints[joint.index], settings_);
     set_chain_columns(record_, joint.index, joint.motion);

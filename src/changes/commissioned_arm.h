@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// An arm as its healthy records tell it, and a record by it: what the chain does not take is each joint's
+// An arm as its healthy records show it, and a record by it: what the chain does not take is each joint's
 // own.
 #pragma once
 
@@ -32,9 +32,9 @@ class CommissionedArm {
 
   /// Reads a record joint by joint. Throws CannotIdentify where no joint can be judged.
   void read(const arm::ArmRecord& record, Changes& out);
-  /// The record's chain is another one by this, too.
+  /// From here on the record's chain differs by this, too.
   void differ(const ChainDifference& difference, const arm::ArmRecord& record);
-  /// Looks at a joint anew, beside what stands beside.
+  /// Looks at a joint anew, with what was found before as further columns.
   void set_search(ArmJoint& joint) const;
   /// Nothing without encoders behind the gap. Throws CannotIdentify.
   std::optional<JointDeflection> deflection(std::size_t index) const;

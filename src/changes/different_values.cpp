@@ -38,7 +38,7 @@ signal::Measured difference(const HealthyModel& model, const Background& b, int 
 }  // namespace
 
 std::vector<DifferentValue> different_values(const HealthyModel& model, Background background, bool linear) {
-  // Values of another machine are not drawn to those of the healthy one.
+  // No prior: values of another machine must not be drawn to those of the healthy one.
   background.spread.head(kCommonColumns).setConstant(std::numeric_limits<double>::infinity());
   if (model.sampling.channel == ChangeChannel::deflection)
     background.spread[kHalfGap] = std::numeric_limits<double>::infinity();

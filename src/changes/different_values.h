@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A record that is another machine's from its first sample on: no onset tells it, the values themselves do.
+// A record that is another machine's from its first sample on: no onset shows it, the values themselves do.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Columns of effects: of all moments, filtered as the record is, of the rows that count. There are some
-// hundred of them in each look, so that they take most of its time.
+// Columns of effects: computed at all samples, filtered like the record, kept for the rows that count. There
+// are some hundred of them in each look, so that they take most of its time.
 #include <cmath>
 
 #include "change_effects.h"
@@ -12,7 +12,7 @@ constexpr double kMostKnown = 1e7;     // rows of columns that are kept, 160 MB 
 constexpr Eigen::Index kTogether = 8;  // as many as low_pass_columns() takes at once
 
 bool is_kept(const ChangeEffect& effect) {
-  // Those of the load change with what the machine is taken for; those of a place are asked for once.
+  // Columns of the load depend on the assumed machine; columns of a place are needed once only.
   return !effect.of_load() && !effect.at_place();
 }
 
@@ -25,7 +25,7 @@ bool has_room(const SampledMotion& motion) {
   return double(motion.known_columns.size()) * double(motion.size()) < kMostKnown;
 }
 
-/// cos(n q), sin(n q) of all moments, from one order to the next by a turn of each: error some 1e-16 per
+/// cos(n q), sin(n q) of all samples, from one order to the next by one rotation: error some 1e-16 per
 /// order.
 class Turning {
  public:

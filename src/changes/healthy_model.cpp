@@ -53,7 +53,7 @@ PooledFit pooled(const HealthyData& data) {
     moment += data.columns[r].transpose() * data.motions[r].target;
     fit.rows += data.motions[r].size();
   }
-  // Columns of any size; what the motion does not tell stays 0.
+  // Columns of any size; what the motion does not show stays 0.
   const Eigen::VectorXd scale = gram.diagonal().cwiseMax(1e-12 * gram.diagonal().maxCoeff()).cwiseSqrt();
   const Eigen::VectorXd inverse = scale.cwiseInverse();
   Eigen::MatrixXd scaled = inverse.asDiagonal() * gram * inverse.asDiagonal();
@@ -75,7 +75,7 @@ void set_loads(const Eigen::VectorXd& values, SampledMotion& motion) {
   }
 }
 
-/// What the equation says of each moment, with all that the healthy machine shows.
+/// The healthy machine's equation at each sample, with all its terms.
 void set_torques(const HealthyModel& model, SampledMotion& motion) {
   if (motion.sampling.channel == ChangeChannel::deflection) return;
   std::vector<OfMoment> all = lasting(motion.sampling);
@@ -125,7 +125,7 @@ double squares_taken(const HealthyData& data, const std::vector<Eigen::VectorXd>
   }
   const Eigen::MatrixXd s = a - b * gram.solve(b.transpose());
   for (Eigen::Index i = 0; i < s.rows(); ++i)
-    if (!(s(i, i) > kToldApart * a(i, i))) return 0;
+    if (!(s(i, i) > kLeastOwn * a(i, i))) return 0;
   return c.dot(s.ldlt().solve(c));
 }
 
@@ -160,7 +160,7 @@ void add_further(HealthyData& data, HealthyModel& model, const ChangeSettings& s
   }
 }
 
-/// What a value differs by from record to record (of one record: from half to half), and some more.
+/// How much a value differs from record to record (in one record: from half to half), with a margin.
 Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const ChangeSettings& settings) {
   const double variance = fit.squares / double(fit.rows);
   double target = 0;
@@ -188,17 +188,17 @@ Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const C
       (settings.prior_least * std::sqrt(target) * size.cwiseMax(1e-12).cwiseSqrt().cwiseInverse());
   Eigen::VectorXd spread =
       settings.prior_factor * (high - low).cwiseMax(settings.prior_share * fit.values.cwiseAbs() + least);
-  // A record may begin warm, or colder than before.
+  // A record may begin warmer or colder than the one before.
   if (data.motions.front().sampling.channel == ChangeChannel::torque)
     for (const int k : {kWarmViscous, kWarmCoulomb})
       spread[k] = std::max(spread[k], std::fabs(fit.values[k]));
   return spread;
 }
 
-/// What the healthy machine leaves beside what may differ from record to record and wander within one: the
+/// What the healthy machine leaves beside values that differ between records and wander within one: the
 /// noise that scores are measured by. Twice, as the first round takes the wander for noise. Of an arm, whose
 /// records are short and whose chain leaves more in another task than in those it was fitted to, all of it is
-/// noise: of the measured UR10e four of nine pairs of healthy records were told as changed otherwise.
+/// noise: of the measured UR10e four of nine pairs of healthy records were reported as changed otherwise.
 void set_noise(const PooledFit& fit, const ChangeSettings& settings, HealthyModel& model) {
   model.noise = std::sqrt(fit.squares / double(fit.rows));
   if (model.sampling.chain) {

@@ -37,14 +37,14 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
 MeshLoad mesh_load(const HealthyModel& model, const model::Body& link, double behind,
                    const std::vector<record::Record>& healthy, const ChangeSettings& settings);
 
-/// rad/(N m), of the teeth: what the inertia behind them deflects them by. Of a model of the deflection.
+/// rad/(N m), compliance of the teeth under the inertia behind them, of a model of the deflection.
 double compliance_of(const HealthyModel& model);
 
 /// With `load` of each moment by the model.
 SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
                         const ChangeSettings& settings);
 
-/// Squares that the residual of the healthy machine has in each row: of rough motion more.
+/// Squares of the healthy machine's residual in each row: more where the motion is rough.
 Eigen::VectorXd expected_squares(const HealthyModel& model, const SampledMotion& motion);
 
 /// Residual of the model and its nuisances: columns of its values and what drifts.

@@ -30,7 +30,8 @@ std::vector<Rest> rests_of(const SampledMotion& motion, const ChangeSettings& se
   return rests;
 }
 
-/// What may be there to some degree, and no change: its column, and its values' standard deviation.
+/// An effect that a healthy machine may show to some degree: its column, and the standard deviation of its
+/// values.
 struct Nuisances {
   std::vector<OfMoment> columns;
   std::vector<double> spread;
@@ -78,8 +79,8 @@ void add_wander(const HealthyModel& model, double length, const ChangeSettings& 
   }
 }
 
-/// The equation has dry friction alone warm up, in one time: the rest of it does as well, more or less, and
-/// each day is another.
+/// In the equation dry friction alone warms up, with one time constant. The rest warms up too, more or less,
+/// and differently each day.
 void add_warm_rest(const HealthyModel& model, Nuisances& out) {
   const double warm_up = model.warm_up;
   const double share = std::fabs(model.values[kWarmCoulomb] / model.values[kCoulomb]);

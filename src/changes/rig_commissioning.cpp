@@ -15,11 +15,11 @@ namespace backlash::changes {
 namespace {
 
 constexpr int kLeastOfRecord = 4;   // stretches. Choice
-constexpr int kFirstTries = 3;      // stretches that may tell the machine first. Choice
+constexpr int kFirstTries = 3;      // stretches that may determine the machine first. Choice
 constexpr std::size_t kFewest = 4;  // that must fit. Choice: their scatter is needed
 // Choices, what a stretch may be off by itself:
 constexpr double kJitter = 0.002;                         // of a value, as the equations are no better
-constexpr double kFinestJitter = 0.1;                     // of the finest backlash that can be told
+constexpr double kFinestJitter = 0.1;                     // of the finest backlash that can be estimated
 constexpr double kJitterOfTime = 0.02, kLeastTime = 0.1;  // of the interval between samples, of a delay
 constexpr double kSureOfScatter = 0.05;                   // chance that the healthy stretches scatter less
 
@@ -65,8 +65,8 @@ RigValue machine_value(const HealthyRig& rig, std::size_t quantity, double sprea
   return v;
 }
 
-/// The machine as the first stretches of the first record tell it that fit, about which all others are looked
-/// at.
+/// The machine as the first stretches of the first record that fit show it, about which all others are
+/// looked at.
 void take_machine(const record::Record& record, const ChangeSettings& settings, HealthyRig& rig) {
   diagnosis::WaveformValues found;
   std::string reason;
@@ -102,9 +102,9 @@ void take_machine(const record::Record& record, const ChangeSettings& settings, 
 }
 
 /// The values one by one, and:
-///   motor_torque_gain    the motor's torque is 1/k of what is recorded: all torques of the machine times k,
-///   and
-///                        the sensor's gain over k, move as it does
+///   motor_torque_gain    the motor's torque is 1/k of what is recorded: all torques of
+///                        the machine times k, and the sensor's gain
+///                        over k, move as it does
 ///   motor_position_gain  by the symmetry of waveform.h: values times k^-power show k times the position
 std::vector<RigEffect> effects_of(const HealthyRig& rig, const ChangeSettings& settings) {
   const auto count = static_cast<Eigen::Index>(rig.values.size());

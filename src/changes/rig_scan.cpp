@@ -84,7 +84,7 @@ RigChange RigScan::of(std::size_t effect, const RigShape& shape, const Sums& sum
   RigChange change;
   change.effect = effect, change.shape = shape;
   const double information = e.direction.dot(sums.information * e.direction);
-  // Of what the record does not tell there is nothing to score.
+  // Of what the record does not show there is nothing to score.
   if (!(information * e.least * e.least > kLeastInformation)) return change;
   change.size = e.direction.dot(sums.score) / information;
   change.variance = e.inflation / information;

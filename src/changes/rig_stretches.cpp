@@ -18,7 +18,7 @@ using record::Channel;
 
 constexpr std::size_t kReversals = 8;  // of a stretch. Choice: with more the errors hardly shrink
 constexpr double kTurned = 0.3;        // of the middle size, beyond which the torque is on a side. Choice
-constexpr double kContext = 2;   // of a stretch, to either side: tells where a square wave reverses. Choice
+constexpr double kContext = 2;   // of a stretch, to either side: shows where a square wave reverses. Choice
 constexpr double kUneven = 0.1;  // of an interval, error of a stamp. Choice: the fit asks for less
 constexpr double kGap = 2.5;     // intervals between samples that are none. Choice
 constexpr double kOtherLevel =
@@ -28,8 +28,9 @@ constexpr double kModelError = 0.002;  // of the swing, as in the fit: no model 
 constexpr double kMoreLeftOut =
     0.25;  // of the reversals, more than of the healthy machine. Choice: two of eight
 constexpr double kChangeSpread = 30;  // in coordinates, of a change of all values: as good as free. Choice
-constexpr double kLeastPlay = 0.1;  // of the finest backlash that can be told, or of the healthy one. Choice
-constexpr double kWide = 3;         // spread of the logarithm of the backlash: as good as free. Choice
+constexpr double kLeastPlay =
+    0.1;                     // of the finest backlash that can be estimated, or of the healthy one. Choice
+constexpr double kWide = 3;  // spread of the logarithm of the backlash: as good as free. Choice
 
 /// First sample on another side than before.
 std::vector<std::size_t> reversals_of(const std::vector<double>& torque, double level) {
@@ -43,7 +44,7 @@ std::vector<std::size_t> reversals_of(const std::vector<double>& torque, double 
   return found;
 }
 
-/// Stamps that are no clock's say nothing of the machine.
+/// Stamps that no clock made say nothing of the machine.
 bool even(const record::Record& record, const Stretch& at) {
   const double interval = record.sampling_interval();
   const auto first = std::lower_bound(record.time.begin(), record.time.end(), at.from);
@@ -61,13 +62,13 @@ bool explained(const FittedStretch& s, const HealthyRig& rig) {
   return s.left_out <= rig.left_out + kMoreLeftOut;
 }
 
-/// Score and information at the healthy machine, in the coordinates of its values, less sure by what a
-/// stretch may be off by itself: of the information I and that spread Q the rest is (1 + I Q)^-1 I.
+/// Score and information at the healthy machine, in the coordinates of its values, made less certain by what
+/// a stretch may be off by itself: of the information I and that spread Q the rest is (1 + I Q)^-1 I.
 void take_score(const diagnosis::WaveformValues& found, const HealthyRig& rig, FittedStretch& out) {
   const Eigen::Index count = found.z.size();
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(count), at = found.z, jitter(count);
   const double unit = rig.values[0].value;
-  // Where there is next to no play, its logarithm is anything.
+  // Where there is almost no play, its logarithm is arbitrary.
   scale[0] = unit / (std::max(found.backlash, kLeastPlay * unit) * found.spread[0]);
   at[0] = (found.backlash - rig.backlash) / unit;
   for (Eigen::Index i = 0; i < count; ++i)

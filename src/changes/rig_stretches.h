@@ -47,7 +47,7 @@ struct RigValue {
   double scale_error = 0;  // of the logarithm of `value`: what declared values leave open
 };
 
-/// A change that can be told: a value of the machine, or the gain of a sensor that scales many of them.
+/// A change that can be reported: a value of the machine, or the gain of a sensor that scales many of them.
 struct RigEffect {
   std::string name, unit;
   Eigen::VectorXd direction;  // of the coordinates, per unit of its size

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kThinned = 0.25;  // - of the rate that is kept, where its filter ends. Theory: below a half
 
-constexpr double kFar = 1e3;  // rad, since a reversal that was before the record
+constexpr double kLongSince = 1e3;  // rad, since a reversal that was before the record
 
 struct EvenSamples {
   std::vector<double> torque, position, deflection, chain;
@@ -73,7 +73,7 @@ double median_of_three(double a, double b, double c) {
 }
 
 /// Takes out single values that stick out of both neighbours as noise never does: one wrong reading would
-/// outweigh an hour of right ones. What is taken out is not there.
+/// outweigh an hour of right ones. Such a value becomes a lost sample.
 void take_out_spikes(std::vector<double>& values, std::vector<char>& there, const ChangeSettings& settings) {
   const std::vector<double> raw = values;
   const auto middle = [&](std::size_t k) { return median_of_three(raw[k - 1], raw[k], raw[k + 1]); };
@@ -98,7 +98,7 @@ bool rests_on_flank(const SampledMotion& motion, std::size_t k) {
   return std::min(std::fabs(now.mesh), now.side() * other) > least;
 }
 
-/// Samples that are there, move and rest on a flank, and have such about them for `guard`.
+/// Samples that are present, move and rest on a flank, as do those within `guard` about them.
 std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& there, std::size_t guard,
                          const ChangeSettings& settings) {
   const std::size_t n = there.size();
@@ -110,7 +110,7 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
     const double pull = std::fabs(motion.moments[k].acceleration);
     const bool known = fast == 0 || (speed < fast && pull < hard);
     if (there[k] && speed > slow && known && rests_on_flank(motion, k)) continue;
-    // Filters ring for long after a jump of the position, which no motion is.
+    // Filters ring for long after a jump of the position that no motion makes.
     const bool jump = fast > 0 && (speed > settings.jump * fast || pull > settings.jump * hard);
     const std::size_t reach = jump ? settings.jump_guard * guard : guard;
     const std::size_t last = std::min(n, k + reach + 1);
@@ -119,7 +119,7 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
   return good;
 }
 
-/// Every n-th sample, after a filter that takes away what those could not tell from slower motion.
+/// Every n-th sample, after a filter that takes away what they would show as slower motion.
 void thin(std::vector<double>& values, std::size_t n, double interval) {
   const std::vector<double> slow = signal::low_pass(values, interval, kThinned / (double(n) * interval));
   values.clear();
@@ -162,7 +162,7 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
       squares_about(jerk, static_cast<std::size_t>(std::lround(settings.rough / dt)));
   const std::vector<double> parting =
       signal::derivative(signal::derivative(filtered(even.deflection), dt), dt);
-  double way = kFar;
+  double way = kLongSince;
   for (std::size_t k = 0; k < position.size(); ++k) {
     if (k > 0) way = speed[k] * speed[k - 1] < 0 ? 0 : way + std::fabs(position[k] - position[k - 1]);
     Moment m = {double(k) * dt,

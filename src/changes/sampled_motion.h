@@ -32,7 +32,7 @@ struct MotionSampling {
   ChangeChannel channel = ChangeChannel::torque;
   double behind = 0;             // - of the inertia that moves with the load's encoder; 0: there is none
   std::optional<MeshLoad> mesh;  // none: one inertia, or not known yet
-  bool chain = false;            // records tell as output_torque what the rest of an arm takes
+  bool chain = false;            // records state as output_torque what the rest of an arm takes
   /// N m, that the teeth may bear beside; a flank counts that is pressed with it and without. Empty: nothing.
   std::function<double(const Moment&)> other_load;
   double interval = 0;         // s, of what is looked at

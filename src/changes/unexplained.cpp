@@ -95,7 +95,7 @@ std::optional<LoudStretch> loud_stretch(const std::vector<double>& times, const 
       const double sum = w.sum(i, j), rows = w.count(i, j);
       const double rest = w.squares[n] - sum, rest_rows = w.rows[n] - rows;
       const double outside = std::max(1.0, rest_rows > 0 ? rest / rest_rows : 0), inside = sum / rows;
-      // A push is over within two windows; the others must be loud by themselves.
+      // A push is over within two windows: without the two loudest the others must still be loud.
       const double others = (sum - w.sum_of(loudest) - w.sum_of(next)) /
                             std::max(1.0, rows - w.count_of(loudest) - w.count_of(next));
       if (std::min(inside, others) < settings.unknown_louder * outside) continue;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kCellsPerSigma = 4;  // of the grid on which distributions are summed
 constexpr int kReach = 18;   // cells beyond which a normal distribution is 0 or 1: 4.5 standard deviations
-constexpr int kShares = 64;  // places of a centre within its cell that are told apart
+constexpr int kShares = 64;  // places of a centre within its cell that are distinguished
 constexpr double kLeastNoise = 2e-4;     // of the range of a distribution, less cannot be seen in it
 constexpr double kLevelRatio = 1.03;     // between levels of noise at which a family is kept
 constexpr std::size_t kMostLevels = 32;  // half a megabyte each

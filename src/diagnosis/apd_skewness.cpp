@@ -212,7 +212,7 @@ std::optional<Estimate> refusal(const record::Record& record, const ApdResult& a
                                                  " had gaps or no sample inside the classes");
   if (std::isnan(apd.noise) && apd.noise_range.upper > kNoiseExcess * curve->noise_levels.back())
     return refuse(Status::insufficient_data,
-                  "one period does not tell the sensor noise at this sampling rate: two or more are needed");
+                  "the sensor noise is unknown from one period at this sampling rate: record two or more");
   return std::nullopt;
 }
 

@@ -39,7 +39,7 @@ Baseline baseline_of(const Diagnosis& diagnosis, const std::string& rig, const s
   const Verdict& verdict = diagnosis.verdict;
   if (!verdict.dissenters.empty())
     throw BadData(rig, "no baseline, the estimates contradict each other: " + verdict.message);
-  // An open or missing interval does not tell how sure the baseline is.
+  // An open or missing interval does not say how sure the baseline is.
   if (!std::isfinite(verdict.backlash_angle) || !std::isfinite(verdict.angle_lower) ||
       !std::isfinite(verdict.angle_upper))
     throw BadData(rig, "no baseline, there is no value with an interval: " + verdict.message);

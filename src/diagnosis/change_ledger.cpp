@@ -14,7 +14,7 @@ constexpr double kSameEvent = 5;  // s between onsets of what is one change. As 
 constexpr double kEdge = 30;      // s at either end of a stretch in which a look may miss one. Choice: three
                                   // times the margin of the search, and what an onset is uncertain by
 constexpr int kMostMissed = 3;    // looks in a row, then a change is withdrawn, or no longer seen. Choice
-constexpr double kSharper = 0.9;  // - of an interval that is worth telling. Choice
+constexpr double kSharper = 0.9;  // - of an interval that is worth a report. Choice
 constexpr double kUndone = 3;     // standard errors within which a size is undone. Choice
 
 const std::pair<ChangeState, const char*> kStates[] = {{ChangeState::suspected, "suspected"},
@@ -45,7 +45,7 @@ bool says_more(const FoundChange& found, const FoundChange& known) {
          first_error(found) < kSharper * first_error(known);
 }
 
-/// Whether the stretch has this change, or another of its joint, from its beginning.
+/// Whether the stretch shows this change, or another one of its joint, from its beginning.
 bool shows(const ChangeLook& look, const FoundChange& change) {
   return std::any_of(look.different.begin(), look.different.end(), [&](const std::string& d) {
     return d.find(change.joint) != std::string::npos || d.find(change.effect) != std::string::npos;
@@ -96,7 +96,7 @@ double rate_of_look(double rate, double window, double interval, std::size_t joi
   return rate * std::min(1.0, interval / window) / double(joints);
 }
 
-/// The change that this one is, of those that no other of the same look is; null: a new one.
+/// The known change that this one repeats, if no other of the same look does; null: a new one.
 KnownChange* ChangeLedger::match(const FoundChange& found, std::vector<long>& keys_taken) {
   KnownChange* best = nullptr;
   for (KnownChange& k : known_) {
@@ -192,8 +192,8 @@ void ChangeLedger::miss(const ChangeLook& look, const std::vector<long>& keys_ta
     known_.erase(known_.begin(), known_.end() - static_cast<std::ptrdiff_t>(kMostKnown));
 }
 
-/// Changes before this look's time: while they stand it differs from its beginning. Those that no look ever
-/// saw so are too small for that, and its absence says nothing.
+/// Changes before this look's time: while they last, it differs from its beginning. A change that no look
+/// ever saw like that is too small for it: its absence then says nothing.
 void ChangeLedger::lose(const ChangeLook& look, std::vector<long>& news) {
   const auto another = [&](const KnownChange& k) {  // stands, and may be what the look sees
     return std::any_of(known_.begin(), known_.end(), [&](const KnownChange& o) {
@@ -235,18 +235,18 @@ void ChangeLedger::restart() {
   different_looks_ = 0;
 }
 
-void ChangeLedger::restore(const std::vector<KnownChange>& told) {
-  for (const KnownChange& k : told) {
+void ChangeLedger::restore(const std::vector<KnownChange>& reported) {
+  for (const KnownChange& k : reported) {
     known_.push_back(k);
     known_.back().key = ++last_key_;
     last_id_ = std::max(last_id_, k.id);
   }
 }
 
-std::vector<KnownChange> ChangeLedger::told() const {
+std::vector<KnownChange> ChangeLedger::reported() const {
   std::vector<KnownChange> all;
   std::copy_if(known_.begin(), known_.end(), std::back_inserter(all),
-               [](const KnownChange& k) { return k.told(); });
+               [](const KnownChange& k) { return k.reported(); });
   return all;
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kMuchWider = 2;  // choice: times the interval without what the file leaves open
 
-/// Linear between the points of the curve.
+/// Interpolates linearly between the points of the curve.
 double at(const MonitoringCurve& curve, const std::vector<double>& values, double backlash) {
   std::size_t i = 0;
   while (i + 2 < curve.points.size() && curve.points[i + 1].backlash < backlash) ++i;

@@ -78,7 +78,7 @@ Estimate by_position_difference(const DiagnosisInput& in) {
 }
 
 Estimate by_momentum_transfer(const DiagnosisInput& in) {
-  if (!in.settings.momentum_transfer) return not_served("the rig tells no inertia to go by");
+  if (!in.settings.momentum_transfer) return not_served("the rig file declares no inertia");
   if (in.lock_contradicted) return not_locked(*in.lock_contradicted);
   return estimate_momentum_transfer(in.record, *in.settings.momentum_transfer);
 }

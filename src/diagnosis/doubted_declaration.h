@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the declared values are worth once the record shows that the machine is not of the declared kind.
+// How far declared values count once the record shows that the machine is not of the declared kind.
 #pragma once
 
 #include <vector>

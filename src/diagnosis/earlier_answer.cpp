@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kOldest = 300;       // s: choice
 constexpr double kLeastMove = 0.02;   // of the value: choice
-constexpr double kFewestPeriods = 5;  // in all, of which errors can be told: choice
+constexpr double kFewestPeriods = 5;  // in all, of which errors can be estimated: choice
 constexpr long kMostBins = 200;       // of a period: choice
 constexpr double kNoChange = 0.01;    // of the swing: choice
 constexpr double kApart = 4;          // squared errors, mean: theory, 1.3 +- 0.4 by chance with ten periods
@@ -53,7 +53,7 @@ bool contradicts(const Estimate& e, const Estimate& answer) {
 }
 
 /// Mean of the squared differences of two mean periods, in their squared standard errors; 0 where too little
-/// is there to tell.
+/// is there to compare.
 double distance(const MeanPeriod& a, const MeanPeriod& b) {
   if (a.mean.size() != b.mean.size()) return 0;
   double sum = 0, bins = 0;

@@ -21,16 +21,16 @@ constexpr std::size_t kHalves[] = {4, 8, 16, 32};  // samples, half a window
 constexpr double kPowers[] = {0.55, 2.0 / 3, 0.73, 0.8, 0.9, 1};
 constexpr double kHardening[] = {0.05, 0.1, 0.2, 0.4, 0.8, 1.6};
 constexpr double kOtherPower = 0.05;  // from the declared one, beyond which it is another: choice
-constexpr double kLawErrors = 3;      // standard errors by which the record tells two laws apart: choice
+constexpr double kLawErrors = 3;      // standard errors by which the record distinguishes two laws: choice
 // Mean square left over that of the best law, up to which another is not ruled out once the declared one is:
-// none of those tried is the true one exactly. Larger where the best one tells the play to a tenth only, be
-// it the declared one, and where the recorded torque is too noisy to tell. Simulated machines.
+// none of those tried is the true one exactly. Larger where the best one gives the play to a tenth only, be
+// it the declared one, and where the recorded torque is too noisy to decide. Simulated machines.
 constexpr double kAnyLaw = 1.5, kAnyUnsureLaw = 2.5, kAnyNoisyLaw = 3, kSure = 0.1;
 constexpr double kSurelyWorse = 3;  // likewise, of one cut: not looked at any further
 constexpr double kTooNoisy = 4;  // what is typical over that of the sharpest cut: not read by any other law
-constexpr double kSharp = 3;     // the same: where laws are told apart
+constexpr double kSharp = 3;     // the same: where laws are distinguished
 constexpr double kNotFound = 4;  // mean square over that of the best law, of one that finds no flanks: choice
-// Cuts must tell the same play, to within so many of their errors, where what they leave is up to so many
+// Cuts must give the same play, to within so many of their errors, where what they leave is up to so many
 // times what the surest does. Choices.
 constexpr double kLikewiseErrors = 4, kLikewise = 2;
 constexpr double kOutlying = 5;  // standard deviations, beyond which a window is left by any law: choice
@@ -69,7 +69,7 @@ struct Readings {
   const FlankFit& surest() const { return fits[best]; }
 };
 
-/// What windows of another length tell, of the same torque: they reach into touches and flights otherwise.
+/// What windows of another length give, of the same torque: they reach into touches and flights otherwise.
 double windows_change(const std::vector<Cut>& cuts, const std::vector<FlankFit>& fits, std::size_t at) {
   for (const std::size_t other : {cuts[at].longer, cuts[at].shorter})
     if (other != at && fits[other].found) return std::abs(fits[other].gap - fits[at].gap);
@@ -82,8 +82,8 @@ Readings read(const std::vector<Cut>& cuts, const std::vector<char>& worth, cons
   for (std::size_t k = 0; k < cuts.size(); ++k)
     out.fits.push_back(worth[k] ? fit_flanks(cuts[k].windows, model) : FlankFit{});
   for (std::size_t k = 0; k < cuts.size(); ++k) {
-    if (!out.fits[k].found) {  // the one that comes closest tells what the record lacks
-      if (out.fits[k].lack > out.surest().lack) out.best = k;
+    if (!out.fits[k].found) {  // the one that comes closest shows what the record lacks
+      if (out.fits[k].obstacle > out.surest().obstacle) out.best = k;
       continue;
     }
     const double change = windows_change(cuts, out.fits, k),
@@ -93,8 +93,8 @@ Readings read(const std::vector<Cut>& cuts, const std::vector<char>& worth, cons
   return out;
 }
 
-/// The play by another cut that leaves as little, the one that is farthest away beyond the errors of both;
-/// that of the surest where none is.
+/// Of the cuts that leave as little: the play that is farthest away beyond the errors of both;
+/// the surest cut's where there is none.
 double another_gap(const Readings& readings) {
   const FlankFit& surest = readings.surest();
   double gap = surest.gap, farthest = 0;
@@ -138,7 +138,7 @@ struct Law {
   Readings readings;
 };
 
-/// Median size of what a fit leaves of all windows, as a standard deviation.
+/// Median size of the residuals of all windows, as a standard deviation.
 double typical_of(const FlankFit& fit) {
   std::vector<double> away;
   for (const double a : fit.away)
@@ -158,8 +158,8 @@ double left(const FlankFit& fit, double typical) {
   return count > 0 ? sum / count : INFINITY;
 }
 
-/// The cut, of those by one torque if that is given, of which some law leaves least: there laws are told
-/// apart.
+/// The cut, of those by one torque if that is given, of which some law leaves least: there laws are
+/// distinguished.
 std::size_t sharpest_cut(const std::vector<Law>& laws, const std::vector<Cut>& cuts,
                          std::optional<bool> balanced = {}) {
   std::size_t sharpest = 0;
@@ -218,7 +218,7 @@ std::vector<const FlankFit*> fits_of(const std::vector<Law>& laws, std::size_t c
   return fits;
 }
 
-/// What each law leaves over what the best one does, geometric mean over the cuts that tell laws apart.
+/// What each law leaves over what the best one does, geometric mean over the cuts that distinguish laws.
 std::vector<double> squares_of_laws(const std::vector<Law>& laws, const std::vector<Cut>& cuts) {
   const auto typical_at = [&](std::size_t c) {
     double typical = INFINITY;
@@ -269,12 +269,12 @@ FlankReading read_flanks(const TwoEncoders& motion, const FlankModel& model, dou
   const std::vector<Law> laws = read_laws(cuts, model, large_torque);
   FlankReading reading;
   if (!laws[0].readings.surest().found) {
-    reading.fit.lack = laws[0].readings.surest().lack;
+    reading.fit.obstacle = laws[0].readings.surest().obstacle;
     return reading;
   }
   const std::vector<double> squares = squares_of_laws(laws, cuts);
   const auto least = std::size_t(std::min_element(squares.begin(), squares.end()) - squares.begin());
-  // Each stay on a flank tells once.
+  // Each stay on a flank counts once.
   const double apart =
       1 + kLawErrors * kLawErrors / double(std::max<std::size_t>(1, laws[least].readings.surest().stays));
   const std::size_t best = squares[0] <= apart ? 0 : least;

@@ -11,6 +11,7 @@
 
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
+#include "flank_hats.h"
 
 namespace backlash::diagnosis {
 namespace {
@@ -18,7 +19,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kCommonKnots = 48;    // of f over the travel
 constexpr int kGapKnots = 9;        // of b over the travel
 constexpr double kOutermost = 0.4;  // share of the windows that the iteration starts from
 constexpr double kClear = 3;        // residuals beyond which a flank is surely loaded
@@ -31,51 +31,19 @@ constexpr double kInertiaDeviation = 0.5;  // relative, of the declared inertia
 constexpr double kTorqueStep = 0.05;       // of the rms torque, for slopes
 constexpr double kSwings = 0.05;           // of the windows, that change flanks within them: choice
 constexpr int kIterations = 40;
-constexpr std::size_t kFewest = 12;        // windows per flank
 constexpr std::size_t kFewestAgainst = 3;  // stays against the motion, choice: two may be one mistake
-// Share of the windows against the motion, and with it: of 0.1 to 3 % that touches and stops leave the play
-// was told wrong, of motions that tell it 5 % and more are. Simulation.
+// Share of the windows against the motion, and with it. Motions whose windows were 0.1 to 3 % (touches and
+// stops only) gave a wrong play; motions that show it have 5 % and more. Simulation.
 constexpr double kShareAgainst = 0.04;
 // Of the windows, on either flank: with less, one flank is read where the other never is, and teeth of which
-// one side is stiffer look like play. Of records that told a wrong one 2 to 9 %, of 278 others one less than
-// 14 %.
+// one side is stiffer look like play. Records that gave a wrong play had 2 to 9 %; of 278 others one had less
+// than 14 %.
 constexpr double kShareOfFlank = 0.1;
-// Of the squares of side, what f, the torque and the motion leave: where they tell the side, as in moves to
-// and fro over the same path, each flank pressed in its own part of it, they take the play as well. Of 150
-// such records those with less than 1e-4 told a third to two thirds of the play, the others had more than
-// 4e-3.
+// Of the squares of side, what f, the torque and the motion leave: where these determine the side, as in
+// moves to and fro over the same path, each flank pressed in its own part of it, they take the play as well.
+// Of 150 such records those with less than 1e-4 gave a third to two thirds of the play, the others had more
+// than 4e-3.
 constexpr double kOwnShare = 3e-3;
-
-double scaled(double n, double count) {
-  return std::max(1.0, std::floor(n / count));
-}
-
-/// Piecewise linear functions of q, one per column.
-MatrixXd hats(const std::vector<double>& q, int knots) {
-  MatrixXd h = MatrixXd::Zero(static_cast<Eigen::Index>(q.size()), knots);
-  const auto [low, high] = signal::extent(q);
-  for (std::size_t i = 0; i < q.size(); ++i) {
-    if (knots == 1) {
-      h(i, 0) = 1;
-      continue;
-    }
-    const double x = (knots - 1) * (q[i] - low) / (high - low);
-    const int k = std::clamp(static_cast<int>(x), 0, knots - 2);
-    h(i, k) = 1 - (x - k);
-    h(i, k + 1) = x - k;
-  }
-  return h;
-}
-
-/// Of each row the first of the two neighbouring columns outside of which all are zero; 0 of less than two.
-std::vector<Eigen::Index> first_knots(const MatrixXd& h) {
-  const Eigen::Index last = std::max<Eigen::Index>(0, h.cols() - 2);
-  std::vector<Eigen::Index> first(static_cast<std::size_t>(h.rows()), last);
-  for (Eigen::Index k = last; k >= 0; --k)
-    for (Eigen::Index i = 0; i < h.rows(); ++i)
-      if (h(i, k) != 0) first[static_cast<std::size_t>(i)] = k;
-  return first;
-}
 
 double rms(const std::vector<double>& x) {
   return std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size()));
@@ -108,12 +76,8 @@ class Fitter {
  public:
   Fitter(const FlankWindows& windows, const FlankModel& model)
       : w_(windows), model_(model), n_(windows.size()) {
-    const int common =
-        model.moving ? static_cast<int>(std::min<double>(kCommonKnots, scaled(double(n_), 40))) : 1;
-    const int gaps =
-        model.moving ? static_cast<int>(std::min<double>(kGapKnots, scaled(double(n_), 200))) : 1;
-    common_ = hats(w_.load, common);
-    gap_ = hats(w_.load, gaps);
+    common_ = model.moving ? position_hats(w_.load, kCommonKnots, kWindowsPerKnot) : MatrixXd::Ones(n_, 1);
+    gap_ = model.moving ? position_hats(w_.load, kGapKnots, 200) : MatrixXd::Ones(n_, 1);
     common_first_ = first_knots(common_), gap_first_ = first_knots(gap_);
     phi_ = Eigen::Map<const VectorXd>(w_.deflection.data(), n_);
     inertia_ = model.inertia;
@@ -240,7 +204,8 @@ void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
   VectorXd right = VectorXd::Zero(a_.cols());
   add_windows(&normal, &right);
   const double noise = sigma_ > 0 ? sigma_ : 0.1 * std::sqrt(phi_.squaredNorm() / static_cast<double>(n_));
-  // A declaration is worth one window per its own variance times what a correlated record repeats itself.
+  // A declaration counts like one window of its own variance, times how often a correlated record repeats
+  // itself.
   const double weight = noise * noise * std::max(1.0, count / 50);
   if (inertia_ > 0 && model_.inertia > 0) {
     const double precision = noise * noise / std::pow(kInertiaDeviation * model_.inertia, 2);
@@ -317,7 +282,7 @@ void Fitter::iterate(bool by_position, int iterations) {
   const MatrixXd gap = by_position ? gap_ : MatrixXd::Ones(n_, 1);
   for (int k = 0; k < iterations; ++k) {
     const auto used = std::count(use_.begin(), use_.end(), 1);
-    if (used < 2 * static_cast<long>(kFewest)) return;
+    if (used < 2 * static_cast<long>(kFewestOnFlank)) return;
     solve(gap, k == 0 || !model_.moving ? model_.elastic_deviation : 0);
     take_over();
     if (!choose_loaded() && k > 2) return;
@@ -418,19 +383,19 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
   const double left = 1 - noise * inverse_(elastic_at_, elastic_at_);
   fit.attenuation = left > 0 ? noise * p_[elastic_at_] * row[elastic_at_] / left : INFINITY;
   const auto fewer = double(std::min(fit.used[0], fit.used[1]));
-  fit.lack = [&] {
-    if (fewer < std::max(double(kFewest), model_.moving ? kShareOfFlank * count : 0))
-      return FlanksLack::pressed;
-    if (fit.against < kFewestAgainst) return FlanksLack::both_directions;
-    if (model_.moving && share_that_swings() > kSwings) return FlanksLack::whole_windows;
-    if (model_.moving && gap.cols() == 1 && kOwnShare * alone >= 1) return FlanksLack::own_part;
-    return FlanksLack::nothing;
+  fit.obstacle = [&] {
+    if (fewer < std::max(double(kFewestOnFlank), model_.moving ? kShareOfFlank * count : 0))
+      return FlankObstacle::not_pressed;
+    if (fit.against < kFewestAgainst) return FlankObstacle::one_direction;
+    if (model_.moving && share_that_swings() > kSwings) return FlankObstacle::chatter;
+    if (model_.moving && gap.cols() == 1 && kOwnShare * alone >= 1) return FlankObstacle::own_part;
+    return FlankObstacle::none;
   }();
-  fit.found = fit.lack == FlanksLack::nothing;
+  fit.found = fit.obstacle == FlankObstacle::none;
   return fit;
 }
 
-/// Does the record hold the compliance? Then the declaration is not needed, and may be wrong.
+/// Whether the record determines the compliance: then the declaration, which may be wrong, is not needed.
 bool Fitter::holds_compliance() {
   solve(gap_, 0);
   const double free = p_[elastic_at_];
@@ -443,7 +408,7 @@ FlankFit Fitter::fit() {
   choose_outermost();
   if (model_.moving) iterate(false, 4);  // a locked output has but one position
   iterate(true, kIterations);
-  if (std::count(use_.begin(), use_.end(), 1) < 2 * static_cast<long>(kFewest)) return {};
+  if (std::count(use_.begin(), use_.end(), 1) < 2 * static_cast<long>(kFewestOnFlank)) return {};
   const bool held = model_.moving && holds_compliance();
   const double deviation = held ? 0 : model_.elastic_deviation;
   solve(gap_, deviation);
@@ -454,7 +419,7 @@ FlankFit Fitter::fit() {
     solve(MatrixXd::Ones(n_, 1), deviation);
     fit = result(MatrixXd::Ones(n_, 1));
     if (fit.residual > kVaries * varying.residual) {
-      varying.found = fit.found, varying.lack = fit.lack;
+      varying.found = fit.found, varying.obstacle = fit.obstacle;
       fit = varying;
       fit.varies = true;
       fit.least_gap = knots.minCoeff();
@@ -471,71 +436,8 @@ FlankFit Fitter::fit() {
 
 }  // namespace
 
-FlankWindows average_windows(const TwoEncoders& motion, std::size_t half) {
-  FlankWindows out;
-  const std::size_t n = motion.motor.size();
-  const double h = static_cast<double>(half), span = h * motion.interval;
-  for (std::size_t c = half; c + half < n; c += half) {
-    bool whole = true;
-    double torque = 0, motor = 0, load = 0, least = INFINITY, largest = -INFINITY, rough = 0;
-    const auto deflection = [&](std::size_t i) { return motion.motor[i] - motion.load[i]; };
-    for (std::size_t i = c - half; i <= c + half; ++i) {
-      const double weight = (h - std::abs(static_cast<double>(i) - static_cast<double>(c))) / (h * h);
-      torque += weight * motion.torque[i];
-      motor += weight * motion.motor[i];
-      load += weight * motion.load[i];
-      if (weight > 0) {
-        least = std::min(least, deflection(i));
-        largest = std::max(largest, deflection(i));
-        rough += 0.25 * std::abs(deflection(i - 1) - 2 * deflection(i) + deflection(i + 1)) / (2 * h - 1);
-      }
-      whole = whole && (i == c - half || motion.unbroken[i]);
-    }
-    if (!whole) continue;
-    // Mean speed over the triangle: difference of the means over its two halves (trapezoids).
-    const auto speed = [&](const std::vector<double>& q) {
-      double sum = 0;
-      for (std::size_t i = 0; i < half; ++i)
-        sum += 0.5 * (q[c + i] + q[c + i + 1] - q[c - half + i] - q[c - half + i + 1]);
-      return sum / (h * span);
-    };
-    out.centre.push_back(c);
-    out.torque.push_back(torque);
-    out.deflection.push_back(motor - load);
-    out.load.push_back(load);
-    out.speed.push_back(speed(motion.motor));
-    out.slip.push_back(out.speed.back() - speed(motion.load));
-    const auto acceleration = [&](const std::vector<double>& q) {
-      return (q[c + half] - 2 * q[c] + q[c - half]) / (span * span);
-    };
-    out.acceleration.push_back(acceleration(motion.motor));
-    out.load_acceleration.push_back(acceleration(motion.load));
-    out.least.push_back(least);
-    out.largest.push_back(largest);
-    out.rough.push_back(rough);
-  }
-  return out;
-}
-
-FlankWindows with_balanced_torque(FlankWindows windows) {
-  const auto n = static_cast<Eigen::Index>(windows.size());
-  if (windows.size() < 4 * kFewest) return windows;
-  const MatrixXd position =
-      hats(windows.load, static_cast<int>(std::min<double>(kCommonKnots, scaled(double(n), 40))));
-  MatrixXd a(n, position.cols() + 4);
-  a.leftCols(position.cols()) = position;
-  for (Eigen::Index i = 0; i < n; ++i)
-    a.row(i).tail(4) << windows.acceleration[i], windows.load_acceleration[i], windows.speed[i],
-        windows.speed[i] > 0 ? 1.0 : -1.0;
-  // Scaled to unit length: the columns are of different units. A knot that no window lies near gets nothing.
-  for (Eigen::Index k = 0; k < a.cols(); ++k) a.col(k) /= std::max(1e-300, a.col(k).norm());
-  const VectorXd recorded = Eigen::Map<const VectorXd>(windows.torque.data(), n);
-  Eigen::Map<VectorXd>(windows.torque.data(), n) = a * signal::solve_least_squares(a, recorded).x;
-  return windows;
-}
-
 FlankFit fit_flanks(const FlankWindows& windows, const FlankModel& model) {
-  if (windows.size() < 4 * kFewest) return {};
+  if (windows.size() < 4 * kFewestOnFlank) return {};
   return Fitter(windows, model).fit();
 }
 

@@ -317,15 +317,15 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
   }
   const double by_sensor = torque_by_sensor(walls);
   elastic += std::max(friction, doubt_by_sensor(torque, by_sensor, settings));
-  const double told = std::hypot(play.half_interval(), elastic), held = held_from_peaks(walls, settings);
-  const double value = play.value - 0.5 * held, half = told + 0.5 * held;
+  const double read = std::hypot(play.half_interval(), elastic), held = held_from_peaks(walls, settings);
+  const double value = play.value - 0.5 * held, half = read + 0.5 * held;
   if (value + half < 0) {
     throw Refusal{Status::out_of_domain,
                   fmt::format("the travel of {:.4g} rad is less than the elastic deflection that the rig "
                               "declares: the rig is not this machine, or the motor did not reach both walls",
                               play.travel)};
   }
-  require_same_throughout(play.plays, told);
+  require_same_throughout(play.plays, read);
   estimate.status = Status::ok;
   // Friction on the flanks carries up to as much torque again to the walls.
   if (!settings.subtract_elastic_deflection && settings.elastic_deflection)
@@ -345,7 +345,7 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
     estimate.message += fmt::format(
         "; the ramps go on to {:.4g} N m: on the way there the walls are {:.4g} rad apart, on the way back "
         "{:.4g} rad, as friction holds what the peaks wind up, and the interval holds both; ramps to little "
-        "more than {:.4g} N m would tell",
+        "more than {:.4g} N m would separate them",
         median_of(walls.readings, &WallReading::peak), play.value - held, play.value, walls.level);
   if (settings.subtract_elastic_deflection && std::abs(by_sensor - torque) > kTorqueSpan * torque)
     estimate.message +=

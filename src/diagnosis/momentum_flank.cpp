@@ -93,7 +93,7 @@ Motor collect(const record::Record& record, const MomentumTransferSettings& sett
   if (!tachometer && !record.has(record::Channel::motor_position))
     refuse("the record has neither motor_velocity nor motor_position");
   if (!settings.output_locked && !record.has(record::Channel::load_position))
-    refuse("the load is free and the record has no load_position");
+    refuse("the load is free and the record has no load_position: record it");
   if (record.size() < kFewestSamples)
     refuse("the record has only " + std::to_string(record.size()) + " samples");
   const double interval = record.sampling_interval();
@@ -250,9 +250,10 @@ Flank calm_flank(const Motor& motor, const MomentumTransferSettings& s) {
                              motion * noise_gain(false, motor.tachometer, dt, flank.half, s));
     if (kNoiseFree * flank.noise < 0.5 * flank.level) return flank;
   }
-  throw Refusal{Status::out_of_domain, fmt::format("impacts cannot be told from noise: the torque on the "
-                                                   "flank, {:.4g} N m in the median, has noise of {:.4g} N m",
-                                                   flank.level, flank.noise)};
+  throw Refusal{Status::out_of_domain,
+                fmt::format("impacts cannot be distinguished from noise: the torque on the "
+                            "flank, {:.4g} N m in the median, has noise of {:.4g} N m",
+                            flank.level, flank.noise)};
 }
 
 }  // namespace backlash::diagnosis::momentum

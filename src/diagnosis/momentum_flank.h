@@ -16,7 +16,7 @@ constexpr double kNoiseFree = 5;             // theory: standard deviations of F
 /// Motion of the motor side, sample by sample.
 struct Motor {
   double interval = 0;                          // s
-  bool torque_measured = true;                  // else told from the motion
+  bool torque_measured = true;                  // else estimated from the motion
   bool tachometer = false;                      // speed is measured, position its integral; else the reverse
   std::vector<double> torque, speed, position;  // N m, rad/s, rad
   std::vector<double> load;                     // rad at the motor axis
@@ -34,7 +34,7 @@ struct Crossing {
   double impact_torque = 0;        // N m, F at `impact`
 };
 
-/// F of momentum_transfer.h and what it is told from.
+/// F of momentum_transfer.h and what it is estimated from.
 struct Flank {
   Pinion pinion;
   std::vector<double> torque;   // N m, averaged

@@ -152,7 +152,7 @@ double level_of(const std::vector<double>& without, const std::vector<double>& u
   return best;
 }
 
-/// In long flights the flank carries nothing: what is left there corrects the level of the told torque.
+/// In long flights the flank carries nothing: what is left there corrects the level of the estimated torque.
 void settle_level(Motor& motor, const MomentumTransferSettings& s) {
   for (int round = 0; round < 2; ++round) {
     const Flank flank = calm_flank(motor, s);
@@ -192,7 +192,7 @@ double play_at_rest(const Motor& motor, const MomentumTransferSettings& s) {
 }
 
 /// With the shortest averages that noise does not spoil.
-void tell_level(Motor& motor, const MomentumTransferSettings& s) {
+void estimate_level(Motor& motor, const MomentumTransferSettings& s) {
   const Switches switches = find_switches(motor);
   Motor unit = motor;
   std::fill(unit.speed.begin(), unit.speed.end(), 0.0);
@@ -220,8 +220,8 @@ void tell_level(Motor& motor, const MomentumTransferSettings& s) {
 
 }  // namespace
 
-void tell_torque(Motor& motor, const MomentumTransferSettings& s) {
-  tell_level(motor, s);
+void estimate_torque(Motor& motor, const MomentumTransferSettings& s) {
+  estimate_level(motor, s);
   settle_level(motor, s);
 }
 
@@ -229,10 +229,11 @@ void check_rest(const Motor& motor, const MomentumTransferSettings& s, Estimate&
   const double least = play_at_rest(motor, s), upper = estimate.angle_upper;
   if (upper > kOfRest * least) return;
   estimate.angle_lower = estimate.angle_upper = kNaN;
-  throw Refusal{Status::out_of_domain,
-                fmt::format("the record has no motor_torque, and what is told from the motion contradicts "
-                            "itself: at most {:.3g} rad of flight, {:.3g} rad between the places of rest",
-                            upper, least)};
+  throw Refusal{
+      Status::out_of_domain,
+      fmt::format("the record has no motor_torque, and what is estimated from the motion contradicts "
+                  "itself: at most {:.3g} rad of flight, {:.3g} rad between the places of rest",
+                  upper, least)};
 }
 
 }  // namespace backlash::diagnosis::momentum

@@ -8,7 +8,7 @@ namespace backlash::diagnosis::momentum {
 
 /// Replaces `motor.torque`. Throws Refusal for a motion that is not that under a square wave, and where no
 /// level stands out of the noise.
-void tell_torque(Motor& motor, const MomentumTransferSettings& s);
+void estimate_torque(Motor& motor, const MomentumTransferSettings& s);
 
 /// Refuses an estimate that contradicts the places where the motor rests.
 void check_rest(const Motor& motor, const MomentumTransferSettings& s, Estimate& estimate);

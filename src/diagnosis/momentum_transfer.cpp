@@ -35,7 +35,7 @@ constexpr double kTangent = 1.5;  // theory: Hertz, deflection at a tangent stif
 constexpr double kMomentumLeft = 0.1;
 constexpr double kUnlike = 0.4;     // simulation: rigs whose values are all off; share of the crossings
 constexpr double kNormal95 = 1.96;  // theory: standard deviations of 95 %, both ends
-constexpr double kToldElasticShare = 0.2;  // simulation: the level is told to some 10 %
+constexpr double kEstimatedElasticShare = 0.2;  // simulation: the level is estimated to some 10 %
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid) throw InvalidParameter(std::string("momentum_transfer.") + name, value, limit);
@@ -169,8 +169,8 @@ double half_width(const Travels& travels, const signal::RobustScale& scale, cons
                     "motor side travels {:.4g} rad, farther than the gap",
                     static_cast<double>(flank.half) * motor.interval, smear)};
   const double noisy = kNoisyTiming * smear * std::min(1.0, 2 * kNoiseFree * flank.noise / flank.level);
-  const double share = std::max(s.elastic_uncertainty, motor.torque_measured ? 0 : kToldElasticShare);
-  // What makes crossings of a free load differ may shift all of them.
+  const double share = std::max(s.elastic_uncertainty, motor.torque_measured ? 0 : kEstimatedElasticShare);
+  // Whatever makes crossings of a free load differ may also shift all of them.
   const double unlike = s.output_locked ? 0 : scale.deviation;
   return std::sqrt(scatter * scatter + unlike * unlike + std::pow(signal::median(travels.timing), 2) +
                    noisy * noisy +
@@ -185,7 +185,7 @@ void require_sense(double lower, double upper, const MomentumTransferSettings& s
     throw Refusal{
         Status::insufficient_data,
         fmt::format("in flight the motor side travels no farther than the flanks yield, which the rig "
-                    "file tells within {:.0f} %",
+                    "file states within {:.0f} %",
                     100 * s.elastic_uncertainty)};
 }
 
@@ -198,7 +198,7 @@ void check_friction(const Flank& flank, const MomentumTransferSettings& s) {
                     flank.level, s.motor_friction)};
 }
 
-/// Of a record, by one machine.
+/// The reading of a record by one machine.
 struct Reading {
   Flank flank;
   Travels travels;
@@ -282,7 +282,7 @@ double declared_half_width(const Motor& motor, const Reading& reading, const Mom
   };
   double squares = 0;
   for (std::size_t i = 0; i < less.size(); ++i) {
-    const double larger = std::fmax(change(less[i]), change(more[i]));  // of those that are told
+    const double larger = std::fmax(change(less[i]), change(more[i]));  // of those that are known
     if (std::isnan(larger))
       throw Refusal{
           Status::out_of_domain,
@@ -324,17 +324,17 @@ void require_alike(const Travels& travels, double half, const MomentumTransferSe
 void fill(const record::Record& record, MomentumTransferSettings s, Estimate& estimate) {
   Motor motor = collect(record, s);
   check_domain(motor, s);
-  if (!motor.torque_measured) tell_torque(motor, s);
+  if (!motor.torque_measured) estimate_torque(motor, s);
   if (!s.output_locked && motor.torque_measured)
     for (int i = 0; i < kSettle; ++i) s.motor_friction = friction_in_flight(motor, s);
   const Reading reading = read(motor, s);
   const auto& [flank, travels, scale] = reading;
   require_momentum(travels, s);
-  const double told = half_width(travels, scale, motor, flank, s);
-  require_same_throughout(travels.gap, told);
-  require_alike(travels, told, s);
+  const double read = half_width(travels, scale, motor, flank, s);
+  require_same_throughout(travels.gap, read);
+  require_alike(travels, read, s);
   estimate.declared = declared_half_width(motor, reading, s);
-  const double half = std::hypot(told, estimate.declared);
+  const double half = std::hypot(read, estimate.declared);
   require_sense(scale.centre - half, scale.centre + half, s);
   estimate.angle_lower = std::max(0.0, scale.centre - half);
   estimate.angle_upper = scale.centre + half;
@@ -349,7 +349,7 @@ void fill(const record::Record& record, MomentumTransferSettings s, Estimate& es
                   travels.gap.size(), signal::median(travels.impact_speed),
                   static_cast<double>(flank.half) * motor.interval);
   if (!motor.torque_measured)
-    estimate.message += fmt::format("; torque told from the motion, a square wave of {:.4g} N m",
+    estimate.message += fmt::format("; torque estimated from the motion, a square wave of {:.4g} N m",
                                     std::abs(motor.torque.front()));
   if (estimate.status == Status::below_range)
     estimate.message += "; contact is lost for no longer than elastic deflection and averaging explain";

@@ -10,11 +10,10 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/flank_fit.h"
-#include "backlash_diagnosis/record/encoder_skew.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
-#include "backlash_diagnosis/signal/zero_phase.h"
+#include "encoder_motion.h"
 #include "flank_choice.h"
 #include "refusal.h"
 #include "rest_levels.h"
@@ -22,7 +21,7 @@
 namespace backlash::diagnosis {
 namespace {
 
-constexpr std::size_t kShortestWindow = 4, kLongestWindow = 64;  // samples, half a window
+constexpr std::size_t kLongestWindow = 64;  // samples, half a window
 // Residuals fall by 2^2.5 per doubling of the window where second differences of noise dominate, by 2^0.5
 // where white torque noise does; only the former is worth a longer window.
 constexpr double kNoiseFalls = 2.0;
@@ -43,16 +42,15 @@ constexpr double kLargeTorque = 0.95;  // quantile, where laws of the deflection
 constexpr double kWorthSaying = 0.25;
 constexpr double kLargestScaleError = 0.01;
 // Of the compliance against the declared one. Where the torque has two values only, as with a slow square
-// wave, nothing but the noise of the acceleration tells compliance from play, and draws the former towards 0.
+// wave, nothing but the noise of the acceleration distinguishes compliance from play, and draws the former
+// towards 0.
 constexpr double kLargestFactor = 2;
-// Parts of a record with a moving load tell the same play: to within a share of it, their errors, and what
+// Parts of a record with a moving load give the same play: to within a share of it, their errors, and what
 // the shape of the deflection leaves. Choices, tried on plays that grow within the record.
 constexpr std::size_t kMostParts = 16, kFewestWindows = 32;  // of a part, at least
 constexpr double kPartChange = 0.1, kPartErrors = 4, kPartResiduals = 2;
 constexpr double kSkewErrors = 2;        // theory: standard errors to either side, 95 %
 constexpr std::size_t kFewestStays = 6;  // on a flank
-constexpr double kThrown = 0.1;          // of the rms speed, thrown within a sample: choice
-constexpr double kBroken = 1.5;          // intervals between samples, beyond which they are no neighbours
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid) throw InvalidParameter(std::string("position_difference.") + name, value, limit);
@@ -68,133 +66,6 @@ void check(const PositionDifferenceSettings& s) {
   require(s.load_ratio > 0 && std::isfinite(s.load_ratio), "load_ratio", s.load_ratio, "must be > 0");
   require(std::isfinite(s.encoder_skew), "encoder_skew", s.encoder_skew, "must be finite");
   require(!(s.base_radius <= 0), "base_radius", s.base_radius, "must be > 0");
-}
-
-/// Torque at the motor_position axis that tells the flanks apart: one record's columns differ in what lies
-/// between sensor and teeth.
-struct FlankTorque {
-  const std::vector<double>& values;
-  double factor;        // to the motor_position axis
-  bool behind = false;  // the gear: the motor's inertia is not between
-};
-
-FlankTorque flank_torque(const record::Record& record, const PositionDifferenceSettings& settings) {
-  using record::Channel;
-  for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque})
-    if (record.has(channel)) return {record.column(channel), 1};
-  if (!record.has(Channel::output_torque))
-    throw Refusal{Status::insufficient_data,
-                  "the record has no motor_torque, sensor_torque or output_torque to tell the flanks apart"};
-  const double sign = settings.output_torque_reversed ? -1 : 1;
-  return {record.column(Channel::output_torque), sign / settings.load_ratio, true};
-}
-
-TwoEncoders collect(const record::Record& record, const PositionDifferenceSettings& settings) {
-  for (const record::Channel channel : {record::Channel::motor_position, record::Channel::load_position})
-    if (!record.has(channel))
-      throw Refusal{Status::insufficient_data, "the record has no " + record::channel_name(channel)};
-  const FlankTorque source = flank_torque(record, settings);
-  const std::vector<double>& torque = source.values;
-  const auto &q_motor = record.column(record::Channel::motor_position),
-             &q_load = record.column(record::Channel::load_position);
-  TwoEncoders motion;
-  motion.interval = record.sampling_interval();
-  double last = -INFINITY;
-  for (std::size_t i = 0; i < record.size(); ++i) {
-    if (!std::isfinite(torque[i]) || !std::isfinite(q_motor[i]) || !std::isfinite(q_load[i])) continue;
-    motion.unbroken.push_back(record.time[i] - last < kBroken * motion.interval);
-    last = record.time[i];
-    motion.torque.push_back(source.factor * torque[i]);
-    motion.motor.push_back(q_motor[i]);
-    motion.load.push_back(settings.load_ratio * q_load[i]);
-  }
-  if (motion.motor.size() < 16 * kShortestWindow)
-    throw Refusal{Status::insufficient_data,
-                  "the record has only " + std::to_string(motion.motor.size()) + " usable samples"};
-  return motion;
-}
-
-double travel(const std::vector<double>& values) {
-  return signal::quantile_range(values, 0.01);
-}
-
-/// The load's position `skew` [s] earlier. Near breaks and ends, where it is not known, windows are broken.
-TwoEncoders without_skew(TwoEncoders motion, double skew) {
-  if (skew == 0) return motion;
-  const double samples = skew / motion.interval;
-  motion.load = signal::delayed(motion.load, -samples);
-  const long reach = std::lround(std::ceil(std::abs(samples))) + 2, n = long(motion.motor.size());
-  std::vector<char> unbroken = motion.unbroken;
-  for (long i = 0; i < n; ++i) {
-    if (motion.unbroken[i] && i >= reach && i < n - reach) continue;
-    for (long k = std::max(0L, i - reach); k <= std::min(n - 1, i + reach); ++k) unbroken[k] = false;
-  }
-  motion.unbroken = std::move(unbroken);
-  return motion;
-}
-
-/// Skew of the encoders beside the declared one, where the record tells it apart from zero; else 0 with an
-/// unknown error. The flanks hold a small one like a friction of the motor.
-signal::Measured clear_skew(const TwoEncoders& motion, double inertia) {
-  try {
-    const signal::Measured skew =
-        record::encoder_skew({motion.interval, motion.torque, motion.motor, motion.load, inertia});
-    if (record::is_clear(skew)) return skew;
-  } catch (const CannotIdentify&) {  // too short, or too little moves
-  }
-  return {0, 0};
-}
-
-/// A load that travels farther than the deflection varies shows friction with both signs of its speed.
-bool load_moves(const TwoEncoders& motion) {
-  std::vector<double> deflection(motion.motor.size());
-  for (std::size_t i = 0; i < deflection.size(); ++i) deflection[i] = motion.motor[i] - motion.load[i];
-  const double moved = travel(motion.load);
-  return moved > 0.5 * travel(deflection) && moved > 20 * signal::smallest_step(motion.load);
-}
-
-/// Between two walls no torque drives the motor faster than if it pushed over the whole travel. Positions
-/// that jump are no positions: columns with exchanged names, or other units. `fastest` has thrice that speed,
-/// and only moves over half the travel count, so that neither noise nor a wrong inertia matters; slow
-/// sampling shows no jumps.
-void require_possible(const TwoEncoders& motion, double inertia) {
-  constexpr double kSurelyTooFast = 3;
-  constexpr std::size_t kOutliers = 6;
-  if (!(inertia > 0)) return;
-  double torque = 0;
-  for (const double t : {signal::quantile(motion.torque, 0.01), signal::quantile(motion.torque, 0.99)})
-    torque = std::max(torque, std::abs(t));
-  const double moved = travel(motion.motor);
-  const double fastest = kSurelyTooFast * std::sqrt(2 * torque * moved / inertia);
-  const auto lag = static_cast<std::size_t>(std::min(1e6, 0.5 * moved / (fastest * motion.interval)));
-  if (lag < 1 || !(fastest > 0)) return;
-  std::size_t jumps = 0;
-  for (std::size_t i = 0; i + lag < motion.motor.size(); ++i)
-    jumps += std::abs(motion.motor[i + lag] - motion.motor[i]) > 0.5 * moved;
-  if (jumps > kOutliers)
-    throw Refusal{Status::out_of_domain,
-                  fmt::format("motor_position jumps faster than a torque of {:.4g} N m can drive the motor: "
-                              "columns are exchanged, or a unit is not as declared",
-                              torque)};
-}
-
-/// A torque that alternates throws the motor to and fro within each sample: teeth that push but never pull,
-/// damping and dry friction then do not see the means that are recorded.
-void require_steady(const TwoEncoders& motion, double inertia) {
-  if (!(inertia > 0)) return;
-  const std::size_t n = motion.motor.size(), lag = kShortestWindow;
-  double alternates = 0, squares = 0;
-  for (std::size_t i = 1; i + 1 < n; ++i)
-    alternates += 0.25 * std::abs(motion.torque[i - 1] - 2 * motion.torque[i] + motion.torque[i + 1]);
-  for (std::size_t i = lag; i < n; ++i) squares += std::pow(motion.motor[i] - motion.motor[i - lag], 2);
-  const double speed = std::sqrt(squares / double(n - lag)) / (double(lag) * motion.interval);
-  const double thrown = alternates / double(n - 2) * motion.interval / inertia;
-  if (thrown > kThrown * speed)
-    throw Refusal{Status::out_of_domain,
-                  fmt::format("the torque alternates from sample to sample, which throws the motor by {:.3g} "
-                              "rad/s within them, where it moves at {:.3g} rad/s: a drive that chatters, or "
-                              "a torque that is mostly noise",
-                              thrown, speed)};
 }
 
 struct Fits {
@@ -216,17 +87,18 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
   }
 }
 
-const char* what_lacks(FlanksLack lack) {
-  switch (lack) {
-    case FlanksLack::both_directions:
-      return "each flank is pressed in one direction of motion only, where play is not told from the dry "
-             "friction of the motor; loads that drive, or that are braked, would do";
-    case FlanksLack::whole_windows:
+const char* remedy_of(FlankObstacle obstacle) {
+  switch (obstacle) {
+    case FlankObstacle::one_direction:
+      return "each flank is pressed in one direction of motion only: play looks like the dry friction of the "
+             "motor there; loads that drive, or that are braked, would do";
+    case FlankObstacle::chatter:
       return "flanks change within a few samples: a drive that chatters; calmer torque or faster sampling "
              "would do";
-    case FlanksLack::own_part:
-      return "each flank is pressed in a part of the path, or at a torque, of its own, where play is not "
-             "told from errors of the encoders and from what the teeth yield; moves over other paths and at "
+    case FlankObstacle::own_part:
+      return "each flank is pressed in a part of the path, or at a torque, of its own: play looks like "
+             "errors "
+             "of the encoders, or like what the teeth yield; moves over other paths and at "
              "other speeds would do";
     default:
       return "torque does not press both flanks (10 % of the time at least); loads that drive, or that are "
@@ -235,7 +107,7 @@ const char* what_lacks(FlanksLack lack) {
 }
 
 void require_sound(const FlankFit& fit) {
-  if (!fit.found) throw Refusal{Status::out_of_domain, what_lacks(fit.lack)};
+  if (!fit.found) throw Refusal{Status::out_of_domain, remedy_of(fit.obstacle)};
   if (fit.stays < kFewestStays)
     throw Refusal{Status::insufficient_data, "the motor lies on a flank only " + std::to_string(fit.stays) +
                                                  " times, needed are " + std::to_string(kFewestStays)};
@@ -257,25 +129,25 @@ double torque_size(const TwoEncoders& motion, double share) {
   return signal::quantile(size, share);
 }
 
-/// What the parts of a record tell, in as many as half of them still tell something.
-std::vector<FlankFit> told_by_parts(const FlankReading& whole) {
+/// What the parts of a record give, in as many as half of them still give something.
+std::vector<FlankFit> fits_of_parts(const FlankReading& whole) {
   const std::size_t n = whole.windows.size();
   for (std::size_t parts = kMostParts; parts > 1; parts /= 2) {
-    std::vector<FlankFit> told;
+    std::vector<FlankFit> fits;
     for (std::size_t k = 0; k < parts; ++k) {
       if (n / parts < kFewestWindows) break;
       const FlankFit fit =
           fit_flanks(part_of(whole.windows, k * n / parts, (k + 1) * n / parts), whole.model);
-      if (fit.found && fit.stays >= kFewestStays) told.push_back(fit);
+      if (fit.found && fit.stays >= kFewestStays) fits.push_back(fit);
     }
-    if (2 * told.size() >= parts) return told;
+    if (2 * fits.size() >= parts) return fits;
   }
   return {};
 }
 
 /// Noise of the torque draws the compliance, and with it the play, towards that of no deflection at all. And
 /// a play that is another as soon as windows are longer, or by other windows that leave as little, is none.
-void require_told(const FlankReading& reading) {
+void require_one_play(const FlankReading& reading) {
   const FlankFit& fit = reading.fit;
   if (!std::isfinite(fit.attenuation) || !std::isfinite(reading.windows_change))
     throw Refusal{
@@ -285,41 +157,41 @@ void require_told(const FlankReading& reading) {
     throw Refusal{
         Status::out_of_domain,
         fmt::format("the play changes by {:.4g} rad with the length of the windows: motion that is too "
-                    "slow or too even to tell play from deflection",
+                    "slow or too even to distinguish play from deflection",
                     reading.windows_change)};
   if (std::abs(reading.another_gap - fit.gap) > kPartChange * fit.gap + kPartErrors * error_of(fit))
     throw Refusal{Status::out_of_domain,
                   fmt::format("the play is {:.4g} rad over some windows and {:.4g} rad over others that are "
-                              "told as well: the torque, or the teeth, are not as declared",
+                              "read as well: the torque, or the teeth, are not as declared",
                               fit.gap, reading.another_gap)};
 }
 
 /// An interval as wide as the elastic deflection, or one twice as wide as the play and as a good part of the
-/// deflection, says that play is not told from that.
+/// deflection, says that play is not distinguished from that.
 void require_worth_saying(const FlankReading& reading, double width, double large_torque) {
   const double elastic = std::abs(reading.fit.compliance_factor * reading.model.elastic(large_torque));
   if (width > std::min(elastic, std::max(2 * reading.fit.gap, kWorthSaying * elastic)))
     throw Refusal{
         Status::out_of_domain,
-        fmt::format("the play is told to {:.4g} rad only, where the teeth yield by {:.4g} rad: too few "
-                    "torques, or too few reversals, to tell play from deflection",
+        fmt::format("the play is known to {:.4g} rad only, where the teeth yield by {:.4g} rad: too few "
+                    "torques, or too few reversals, to distinguish play from deflection",
                     width, elastic)};
 }
 
 /// A play that grows within the record gives groups of deflections that are those of no machine, and a play
-/// that lies anywhere. `whole`: what all of it tells.
+/// that lies anywhere. `whole`: what all of it gives.
 void require_constant(const FlankReading& whole) {
-  const std::vector<FlankFit> told = told_by_parts(whole);
-  if (told.empty()) return;
+  const std::vector<FlankFit> fits = fits_of_parts(whole);
+  if (fits.empty()) return;
   const auto less = [](const FlankFit& a, const FlankFit& b) { return a.gap < b.gap; };
-  const auto [least, most] = std::minmax_element(told.begin(), told.end(), less);
+  const auto [least, most] = std::minmax_element(fits.begin(), fits.end(), less);
   const double errors = kPartErrors * std::hypot(least->standard_error, most->standard_error) +
                         kPartResiduals * std::max(least->residual, most->residual);
   const double over_position = whole.fit.varies ? whole.fit.largest_gap - whole.fit.least_gap : 0;
   if (most->gap - least->gap > kPartChange * most->gap + errors + over_position)
     throw Refusal{
         Status::out_of_domain,
-        fmt::format("the play is not the same throughout the record: parts of it tell {:.4g} to {:.4g} rad",
+        fmt::format("the play is not the same throughout the record: parts of it give {:.4g} to {:.4g} rad",
                     least->gap, most->gap)};
 }
 
@@ -347,7 +219,7 @@ double declared_error(const TwoEncoders& motion, const PositionDifferenceSetting
   return 2 * settings.declared_uncertainty * std::abs(settings.elastic_deflection(level));
 }
 
-/// What the flanks tell, and how wide the interval must be for what is known of the record [rad].
+/// What the flanks show, and how wide the interval must be for what is known of the record [rad].
 struct Answer {
   FlankFit fit;
   double half = 0;                // of the interval, about each of
@@ -381,7 +253,7 @@ struct Unskewed {
 };
 
 /// Friction that is not as declared looks like a skew to whoever looks at the whole record: it is taken out
-/// where the flanks are then told more surely.
+/// where the flanks are then known more surely.
 Unskewed read_unskewed(const TwoEncoders& motion, const FlankModel& model, double torque) {
   Unskewed together{read_flanks(motion, model, torque), {0, 0}};
   const signal::Measured skew = clear_skew(motion, model.inertia);
@@ -415,7 +287,7 @@ Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
   const auto [reading, skew] = read_unskewed(motion, model, large_torque);
   const FlankFit& fit = reading.fit;
   require_sound(fit);
-  require_told(reading);
+  require_one_play(reading);
   require_constant(reading);
   const double elastic = fit.compliance_factor * reading.model.elastic(large_torque);
   const double model_error = reading.declared_law
@@ -437,18 +309,18 @@ Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
 }
 
 Answer read(const record::Record& record, const PositionDifferenceSettings& settings) {
-  const TwoEncoders motion = without_skew(collect(record, settings), settings.encoder_skew);
-  if (settings.output_locked && travel(motion.load) > kLockedTravel * travel(motion.motor))
+  const TwoEncoders motion = without_skew(two_encoders(record, settings), settings.encoder_skew);
+  if (settings.output_locked && travelled(motion.load) > kLockedTravel * travelled(motion.motor))
     throw Refusal{Status::out_of_domain,
                   fmt::format("the output moves by {:.4g} rad although the rig says that it is locked",
-                              travel(motion.load))};
-  const double inertia = flank_torque(record, settings).behind ? 0 : settings.motor_inertia;
+                              travelled(motion.load))};
+  const double inertia = torque_at_flanks(record, settings).behind ? 0 : settings.motor_inertia;
   if (settings.output_locked) require_possible(motion, inertia);
   FlankModel model;
   model.elastic = settings.elastic_deflection;
   model.inertia = inertia;
   model.elastic_deviation = settings.elastic_uncertainty / 1.96;
-  model.moving = load_moves(motion);
+  model.moving = load_travels(motion);
   Answer answer = model.moving ? read_moving(motion, model) : read_locked(motion, model, settings);
   answer.remark = describe(answer.fit, model.moving) + answer.remark;
   if (!model.moving) answer.declared = declared_error(motion, settings);
@@ -461,7 +333,7 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
     answer = read(record, settings);
   } catch (const Refusal&) {
     if (settings.output_locked) throw;
-    const TwoEncoders motion = without_skew(collect(record, settings), settings.encoder_skew);
+    const TwoEncoders motion = without_skew(two_encoders(record, settings), settings.encoder_skew);
     if (read_at_rest(motion, settings, estimate)) return;
     throw;
   }

@@ -39,7 +39,7 @@ void require_same_throughout(const std::vector<double>& plays, double half_width
         std::max(2 * half_width, kChange * larger) + kErrors * errors)
       throw Refusal{Status::out_of_domain,
                     fmt::format("the play is not the same throughout the record: the first {} of {} passages "
-                                "tell {:.4g} rad, the others {:.4g} rad",
+                                "give {:.4g} rad, the others {:.4g} rad",
                                 cut, n, before.centre, after.centre)};
   }
 }

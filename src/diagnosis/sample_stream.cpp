@@ -11,8 +11,8 @@
 namespace backlash::diagnosis {
 namespace {
 
-constexpr double kKeepPeriods = 3;  // at least, whatever `keep` says; a choice: two tell noise, one is open
-constexpr std::size_t kRecent = 1000;  // samples from which the present rate is told; a choice
+constexpr double kKeepPeriods = 3;  // at least, whatever `keep` says; a choice: two show noise, one is open
+constexpr std::size_t kRecent = 1000;  // samples from which the present rate is estimated; a choice
 constexpr double kForever = std::numeric_limits<double>::infinity();  // s
 
 double get(const record::ChannelValues& values, record::Channel channel) {

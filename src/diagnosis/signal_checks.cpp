@@ -64,7 +64,7 @@ std::size_t repetition_lag(std::vector<double> x) {
   for (double& v : x) v -= mean;
   if (dies_out(x)) return 0;
   const std::size_t longest = n / 2 + 1;  // of a lag: two periods, the last sample of which may be missing
-  // A little beyond, so that a hill at the longest lag is told from one that still rises there.
+  // A little beyond, so that a hill at the longest lag is distinguished from one that still rises there.
   const std::vector<double> r = autocorrelation(x, std::min(n - 1, longest + n / 16 + 2));
   std::size_t first = 1;
   while (first <= longest && r[first] > 0) ++first;  // past the first zero: the lobe around lag 0

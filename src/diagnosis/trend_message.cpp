@@ -55,8 +55,8 @@ std::string no_trend(const Trend& t, std::size_t times, const Words& words) {
     return "the points span " + span_text(t.span) + ", at least " + span_text(kShortestSpan) + " are needed";
   if (!t.known)
     return "the errors of the " + std::to_string(t.points) + " points over " + span_text(t.span) +
-           " hang together for too long; later points will tell";
-  const std::string what = t.rate_upper < 0 ? "shrinks by " : "growth cannot be told from none: ";
+           " hang together for too long; later points will show more";
+  const std::string what = t.rate_upper < 0 ? "shrinks by " : "growth is not distinguished from none: ";
   return what + words.rate(t);
 }
 

@@ -91,7 +91,7 @@ Set consistent(const Estimates& all, const Set& sound) {
 struct Choice {
   Set members, dissenters;
   Set agree;           // say the same as the members and are not needed
-  Set parts;           // free play, where the members tell that with the deflection under torque
+  Set parts;           // free play, where the members give that with the deflection under torque
   std::string reason;  // of the choice, where there are dissenters
 };
 
@@ -130,7 +130,7 @@ Choice choose(const Estimates& all) {
     choice.reason = "the record itself shows what the others take from the rig file: is it this machine's?";
     if (measured.empty() || !share_a_point(all, measured, kContradiction)) {
       choice.members.clear();
-      choice.reason = "nothing on the record tells who is right";
+      choice.reason = "nothing in the record shows which is right";
     } else {
       choice.members = measured;
     }
@@ -223,7 +223,7 @@ Amount growth_since(const Baseline& b, const Amount& now, bool angular) {
     return {kNaN, now.lower - up, kInfinity};
   }
   const double growth = now.value - then.value;
-  const auto apart = [](double x, double y) { return std::isnan(x - y) ? 0 : x - y; };  // not told: exact
+  const auto apart = [](double x, double y) { return std::isnan(x - y) ? 0 : x - y; };  // not known: exact
   return {growth, growth - std::hypot(now.value - now.lower, apart(then.upper, then.value)),
           growth + std::hypot(now.upper - now.value, apart(then.value, then.lower))};
 }

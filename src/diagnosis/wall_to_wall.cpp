@@ -12,7 +12,7 @@
 namespace backlash::diagnosis {
 namespace {
 
-constexpr double kSwitchTime = 0.1;    // passage between the sides over length of an excursion
+constexpr double kShortPassage = 0.1;  // passage between the sides over length of an excursion
 constexpr double kSwitchChange = 0.2;  // change of torque in the last third of an excursion over torque
 // Largest ratio of spreads half a window apart that is still taken for dying ringing.
 constexpr double kLargestDecay = 0.7;
@@ -63,7 +63,7 @@ bool is_switched(const std::vector<TorqueExcursion>& excursions, const std::vect
   }
   const double torque = median_of(readings, &WallReading::torque);
   const double change = median_of(readings, &WallReading::torque_change);
-  return signal::median(passage) < kSwitchTime * signal::median(length) && change < kSwitchChange * torque;
+  return signal::median(passage) < kShortPassage * signal::median(length) && change < kSwitchChange * torque;
 }
 
 double drift_rate(const std::vector<WallReading>& readings) {

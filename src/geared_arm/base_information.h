@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a motion of an arm tells of its base parameters, and of how late the torques of its joints are
+// How well a motion of an arm determines its base parameters, and how late the torques of its joints are
 // recorded, which every fit must know as well: dtau/dt is the column of joint j's delay, in its rows.
 #pragma once
 
@@ -24,8 +24,8 @@ Eigen::MatrixXd full_regressor(const arm::ArmRig& rig, const arm::Joints& q, con
 
 class BaseInformation {
  public:
-  /// The base parameters are what drawn motions within the limits tell apart. `noise` [N m]: of each joint's
-  /// torque.
+  /// The base parameters are those that drawn motions within the limits identify. `noise` [N m]: of each
+  /// joint's torque.
   BaseInformation(const arm::ArmRig& rig, const std::vector<MotionLimits>& limits, std::vector<double> noise,
                   std::uint64_t seed);
 

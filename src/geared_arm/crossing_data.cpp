@@ -147,7 +147,7 @@ CrossingWindow window_of(const CrossingData& data, const arm::ArmRig& rig, const
   return w;
 }
 
-/// Per sample: whether the load of every joint has been certain for `guard` samples.
+/// Per sample: whether every joint's load has been large enough, of one sign, for `guard` samples.
 std::vector<char> certain(const CrossingData& data, const Stretch& s, Eigen::Index guard,
                           const TraverseSettings& settings) {
   std::vector<char> all(std::size_t(s.load.rows()), 0);

@@ -22,10 +22,10 @@ constexpr double kKnownStiffness = 0.5, kKnownDamping = 0.8, kKnownPower = 0.15,
 constexpr double kKnownCoulomb = 0.5;                   // of the declared friction behind the gap, and
 constexpr double kUndeclaredCoulomb = 0.005;            // of the largest load
 constexpr double kHeldTorque = 0.25, kKnownHeld = 0.3;  // samples: held or averaged; theory, choice
-constexpr double kUntold = 0.01;        // of the largest load: torque on a link that nothing tells; choice
-constexpr double kVaries = 0.1;         // of the gap, and
+constexpr double kUnknownTorque = 0.01;                 // of the largest load, on a link; choice
+constexpr double kVaries = 0.1;                         // of the gap, and
 constexpr double kTeethVary = 0.03;     // of the deflection: what a turn says of the gap otherwise; choices
-constexpr double kSlow = 0.3;           // s, memory of a torque that nothing tells; choice
+constexpr double kSlow = 0.3;           // s, memory of an unknown torque; choice
 constexpr double kRough = 0.03;         // s, the same of friction about a standstill; choice
 constexpr double kRings = 0.5;          // of the deflection: what a link swings on its teeth; choice
 constexpr double kShares[] = {1, 0.3};  // of a step of what is a window's own; choice
@@ -71,14 +71,14 @@ void CrossingFit::take_rotors() {
   mobilities_ = std::make_shared<const std::vector<LinkMobilities>>(std::move(all));
 }
 
-/// Standard deviations of what is a window's own. What the equations do not hold makes each turn say another
-/// gap: without that, the one turn with the hardest touch would tell it alone.
+/// Standard deviations of a window's own values. The equations are not exact, so that each turn says another
+/// gap: without that, the turn with the hardest touch alone would decide.
 VectorXd CrossingFit::own_spread(const CrossingMachine& machine) const {
   const Index n = Index(machine.size());
   VectorXd spread(kCrossingOwn * n);
   for (Index j = 0; j < n; ++j) {
     const TraverseJoint& joint = data_.joints[std::size_t(j)];
-    spread[j] = std::hypot(kUntold * joint.most, joint.slow_torque);
+    spread[j] = std::hypot(kUnknownTorque * joint.most, joint.slow_torque);
     spread[n + j] = std::hypot(kVaries * machine[std::size_t(j)][kCrossingGap],
                                kTeethVary * joint.level / joint.stiffness);
     spread[2 * n + j] = kRings * joint.level / joint.stiffness;
@@ -214,9 +214,9 @@ double CrossingFit::shaken(std::size_t window, std::size_t joint, const Crossing
   return shaken_[window][joint] * (std::exp(2 * machine[joint][kCrossingRotor]) - 1);
 }
 
-/// Minus twice the logarithm of the likelihood of a joint's residuals in a window, whose noise is at least as
-/// large as known: a window that the equations do not explain, such as a long one with many touches, says
-/// little, and does not draw all others with it.
+/// Minus twice the log likelihood of a joint's residuals in a window, with a noise at least as
+/// large as the known one: a window that the equations do not explain, such as a long one with many touches,
+/// says little, and does not draw all others with it.
 double CrossingFit::cost_of(std::size_t window, const VectorXd& residual,
                             const CrossingMachine& machine) const {
   const Index n = residual.size() / Index(machine_.size());
@@ -228,7 +228,7 @@ double CrossingFit::cost_of(std::size_t window, const VectorXd& residual,
   return sum;
 }
 
-/// The rows of each joint by what is left of them.
+/// The rows of each joint, weighted by what is left of them.
 void CrossingFit::weigh(std::size_t window, Part& p) const {
   const Index n = p.residual.size() / Index(machine_.size());
   p.offset = VectorXd::Zero(p.global.cols());
@@ -259,7 +259,7 @@ double CrossingFit::prior_cost(const CrossingMachine& machine) const {
   return sum;
 }
 
-/// Of a window, with what is known of its own values.
+/// Cost of a window, with the priors of its own values.
 double CrossingFit::cost_of(std::size_t window, const CrossingMachine& machine, const VectorXd& own) const {
   return cost_of(window, residual(window, machine, own), machine) +
          own.cwiseQuotient(own_spread(machine)).squaredNorm();
@@ -293,7 +293,7 @@ void CrossingFit::add_priors(MatrixXd& h, VectorXd& g) const {
     }
 }
 
-/// Values that would leave their bounds stay there, and the others do not count on them.
+/// Values that would leave their bounds stay there, and the others are solved for without them.
 void CrossingFit::hold_at_bounds(MatrixXd& h, VectorXd& g) const {
   for (std::size_t j = 0; j < machine_.size(); ++j)
     for (int v = 0; v < kCrossingValues; ++v) {
@@ -320,20 +320,20 @@ CrossingMachine CrossingFit::moved(const VectorXd& step) const {
   return other;
 }
 
-CrossingFit::Told CrossingFit::told_by(const Part& p, const MatrixXd& known, const VectorXd& own) {
-  Told told;
-  told.inverse = signal::symmetric_inverse(signal::gram(p.own) + known);
+CrossingFit::Reduced CrossingFit::reduced(const Part& p, const MatrixXd& known, const VectorXd& own) {
+  Reduced out;
+  out.inverse = signal::symmetric_inverse(signal::gram(p.own) + known);
   const MatrixXd cross = signal::transposed_product(p.global, p.own);
-  const MatrixXd reduced = signal::product(cross, told.inverse);
-  told.information = signal::gram(p.global) - signal::product(reduced, cross.transpose());
-  told.score =
-      p.global.transpose() * p.residual + p.offset - reduced * (p.own.transpose() * p.residual + known * own);
-  return told;
+  const MatrixXd taken = signal::product(cross, out.inverse);
+  out.information = signal::gram(p.global) - signal::product(taken, cross.transpose());
+  out.score =
+      p.global.transpose() * p.residual + p.offset - taken * (p.own.transpose() * p.residual + known * own);
+  return out;
 }
 
-/// Takes a machine, with what is of each window alone moved to suit it where that helps, if it is better.
+/// Takes a machine if it is better, with each window's own values moved along where that helps.
 bool CrossingFit::take(const CrossingMachine& machine, const std::vector<Part>& parts,
-                       const std::vector<Told>& told) {
+                       const std::vector<Reduced>& normals) {
   VectorXd taken(Index(machine.size()) * kCrossingValues);
   for (std::size_t j = 0; j < machine.size(); ++j)
     for (int v = 0; v < kCrossingValues; ++v)
@@ -344,7 +344,7 @@ bool CrossingFit::take(const CrossingMachine& machine, const std::vector<Part>& 
   for_each_in_parallel(int(parts.size()), [&](int i) {
     const auto w = std::size_t(i);
     const Part& p = parts[w];
-    const VectorXd step = -told[w].inverse *
+    const VectorXd step = -normals[w].inverse *
                           (p.own.transpose() * (p.residual + p.global * taken) + known.cwiseProduct(own_[w]));
     costs[w] = cost_of(w, machine, own_[w]);
     for (const double share : kShares) {
@@ -370,11 +370,11 @@ void CrossingFit::run(int steps, double wanted) {
     VectorXd g = VectorXd::Zero(n);
     add_priors(h, g);
     const MatrixXd known = own_spread(machine_).array().pow(-2).matrix().asDiagonal();
-    std::vector<Told> told;
+    std::vector<Reduced> normals;
     for (std::size_t w = 0; w < all.size(); ++w) {
-      told.push_back(told_by(all[w], known, own_[w]));
-      h += told.back().information;
-      g += told.back().score;
+      normals.push_back(reduced(all[w], known, own_[w]));
+      h += normals.back().information;
+      g += normals.back().score;
     }
     hold_at_bounds(h, g);
     const double before = cost_;
@@ -382,7 +382,7 @@ void CrossingFit::run(int steps, double wanted) {
     for (int attempt = 0; attempt < kAttempts && !better; ++attempt) {
       MatrixXd damped = h;
       damped.diagonal() *= 1 + damping_;
-      better = take(moved(-signal::solve_symmetric(damped, g)), all, told);
+      better = take(moved(-signal::solve_symmetric(damped, g)), all, normals);
       damping_ = std::clamp(better ? damping_ / 5 : damping_ * 5, 1e-6, 1e6);
     }
     if (!better || before - cost_ < kLittle) return;
@@ -417,10 +417,10 @@ std::vector<CrossingFit::Errors> CrossingFit::errors() const {
   VectorXd unused = VectorXd::Zero(n);
   add_priors(h, unused);
   const MatrixXd known = own_spread(machine_).array().pow(-2).matrix().asDiagonal();
-  std::vector<Told> told;
+  std::vector<Reduced> normals;
   for (std::size_t w = 0; w < all.size(); ++w) {
-    told.push_back(told_by(all[w], known, own_[w]));
-    h += told.back().information;
+    normals.push_back(reduced(all[w], known, own_[w]));
+    h += normals.back().information;
   }
   for (Index i = 0; i < n; ++i) h(i, i) = h(i, i) * (1 + 1e-9) + 1e-300;
   const MatrixXd inverse = signal::symmetric_inverse(h);
@@ -429,9 +429,9 @@ std::vector<CrossingFit::Errors> CrossingFit::errors() const {
     const int p = place(j, kCrossingGap);
     double sum = 0, squares = 0, clustered = 0;
     for (std::size_t w = 0; w < all.size(); ++w) {
-      const double information = told[w].information(p, p);
+      const double information = normals[w].information(p, p);
       sum += information, squares += information * information;
-      clustered += std::pow(inverse.row(p).dot(told[w].score), 2);
+      clustered += std::pow(inverse.row(p).dot(normals[w].score), 2);
     }
     Errors& e = errors[j];
     e.turns = squares > 0 ? sum * sum / squares : 0;

@@ -32,7 +32,7 @@ class CrossingFit {
   const Eigen::VectorXd& own(std::size_t window) const { return own_[window]; }
   /// Minus twice the logarithm of the likelihood of the residuals and of the deviations from what is known.
   double cost() const { return cost_; }
-  /// The same with another gap, all else but what is each window's own as it is.
+  /// The same with another gap; only each window's own values are fitted anew.
   double cost_with(std::size_t joint, double gap) const;
   /// Root of the mean square of a joint's weighted residuals that most windows do not exceed: about 1 where
   /// the equations hold.
@@ -40,7 +40,7 @@ class CrossingFit {
 
   struct Errors {
     double own = 0, clustered = 0;  // rad, standard errors of the gap
-    double turns = 0;               // how many turns tell it, those that tell more counting more
+    double turns = 0;               // how many turns determine it, better ones counting more
   };
   std::vector<Errors> errors() const;  // per joint
 
@@ -49,11 +49,11 @@ class CrossingFit {
     Eigen::VectorXd residual, offset;  // offset: of half the gradient by the machine, see shaken()
     Eigen::MatrixXd global, own;       // derivatives by the machine, by what is of this window alone
   };
-  struct Told {                            // by one window of the machine, its own values taken out
+  struct Reduced {                         // by one window of the machine, its own values taken out
     Eigen::MatrixXd inverse, information;  // inverse: of the information on its own values
     Eigen::VectorXd score;
   };
-  static Told told_by(const Part& part, const Eigen::MatrixXd& known, const Eigen::VectorXd& own);
+  static Reduced reduced(const Part& part, const Eigen::MatrixXd& known, const Eigen::VectorXd& own);
   Eigen::VectorXd residual(std::size_t window, const CrossingMachine& machine,
                            const Eigen::VectorXd& own) const;
   Part part(std::size_t window) const;
@@ -70,7 +70,8 @@ class CrossingFit {
   double spread(std::size_t joint, int value) const;
   Eigen::VectorXd own_spread(const CrossingMachine& machine) const;
   CrossingMachine moved(const Eigen::VectorXd& step) const;
-  bool take(const CrossingMachine& machine, const std::vector<Part>& parts, const std::vector<Told>& told);
+  bool take(const CrossingMachine& machine, const std::vector<Part>& parts,
+            const std::vector<Reduced>& normals);
   void take_rotors();
   void whiten();
 

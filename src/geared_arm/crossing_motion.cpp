@@ -26,8 +26,8 @@ class Teeth {
   /// Beyond the gap, towards the flank of `side`.
   double depth(double twist, double side) const { return side * twist - half_gap_; }
 
-  /// Towards the flank, of teeth that are pressed; where they would pull they have come apart. On the other
-  /// side of no deflection it goes on smoothly, for the steps that come there.
+  /// Torque towards the flank, of teeth that are pressed; where they would pull they have come apart. On the
+  /// other side of zero deflection it goes on smoothly, for steps that end there.
   double torque(double depth, double rate) const {
     double force = stiffness_ * depth, damping = damping_;
     if (power_ != 1) {
@@ -85,7 +85,7 @@ class Interval {
   const Eigen::MatrixXd &m0_, &m1_;
 };
 
-/// What the teeth of a joint do at a place: torque as if they were pressed.
+/// What the teeth of a joint do at a place: the torque they would have if pressed.
 struct Touch {
   double side, depth, rate, torque;  // -, rad, rad/s, N m, towards the flank of `side`
 };

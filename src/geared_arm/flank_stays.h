@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// When the load of a mesh tells for certain on which flank its teeth rest. One rule for the diagnosis and for
+// When the load of a mesh shows for certain on which flank its teeth rest. One rule for the diagnosis and for
 // the motion that is planned for it.
 #pragma once
 

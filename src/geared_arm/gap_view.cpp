@@ -11,7 +11,7 @@
 namespace backlash::geared_arm {
 namespace {
 
-// What of a motor's own torque (rotor, friction before the gap) nobody knows; choice: 0.2 to 2 % in simulated
+// The unknown share of a motor's own torque (rotor, friction before the gap); choice: 0.2 to 2 % in simulated
 // arms.
 constexpr double kOwnTorque = 0.01;
 
@@ -106,7 +106,7 @@ double GapViews::row_interval() const {
   return 1 / (kRowsPerCycle * arm_.rig.identification.torque_cutoff);
 }
 
-/// What a flank must be pressed with to be told for certain, where the other flank is pressed no more.
+/// The load that shows a flank for certain, where the other flank is pressed no harder.
 double GapViews::least_reach(std::size_t joint) const {
   return friction_[joint].link_coulomb / (1 - settings_.play.least_load);
 }
@@ -182,15 +182,13 @@ void GapViews::describe(JointPlan& plan, std::size_t joint, const arm::Joints& o
     plan.view = GapView::not_found;
     plan.message = fmt::format(
         "not shown by any motion that was tried: {} and {} stays of {:.2g} s beyond {:.3g} N m on the two "
-        "flanks in "
-        "each period, {} on each are needed; the limits allow at most {:.3g} and {:.3g} N m",
+        "flanks in each period, {} on each are needed; the limits allow at most {:.3g} and {:.3g} N m",
         plan.stays[1], plan.stays[0], hold_, plan.certain, wanted, plan.reach[1], plan.reach[0]);
   } else if (rms(load) < least) {
     plan.view = GapView::not_found;
     plan.message = fmt::format(
         "not shown by any motion that was tried: a load of {:.3g} N m (rms), and the motor's own torque and "
-        "the noise "
-        "of it hide what is below {:.3g} N m",
+        "the noise of it hide what is below {:.3g} N m",
         rms(load), least);
   } else {
     plan.message =
@@ -199,8 +197,7 @@ void GapViews::describe(JointPlan& plan, std::size_t joint, const arm::Joints& o
       plan.view = GapView::unconfirmed;
       plan.message = fmt::format(
           "{}, unless the drive's own torque hides a load of {:.3g} N m (rms): the rig file states neither "
-          "its rotor "
-          "nor its friction; identify, and plan again with the fitted file",
+          "its rotor nor its friction; identify, and plan again with the fitted file",
           plan.message, rms(load));
     }
   }

@@ -17,7 +17,7 @@ class GapViews {
            const PlanSettings& settings, std::vector<double> noise);
 
   bool has_gap(std::size_t joint) const { return has_gap_[joint] != 0; }
-  /// Whether a motion may show it, as far as was looked.
+  /// Whether some motion may show it, as far as was searched.
   bool possible(std::size_t joint) const { return has_gap(joint) && obstacles(joint).empty(); }
 
   /// Of the torques of a period, a value per `interval` [s]: 0 where the gap is shown, margin and all; else

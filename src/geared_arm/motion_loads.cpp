@@ -156,7 +156,7 @@ std::vector<HiddenRange> hidden_ranges(const arm::Chain& chain, const std::vecto
                                        const arm::Joints& others, std::size_t joint, double least) {
   const auto j = Eigen::Index(joint);
   const MotionLimits& l = limits[joint];
-  // One turn says all; the one about where the motion is.
+  // One turn is enough: the one in which the motion lies.
   const bool turns = l.upper - l.lower > 2 * M_PI;
   const double lower = turns ? std::clamp(others[j] - M_PI, l.lower, l.upper - 2 * M_PI) : l.lower;
   const double upper = turns ? lower + 2 * M_PI : l.upper;

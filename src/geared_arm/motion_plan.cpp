@@ -18,8 +18,8 @@ namespace {
 
 constexpr std::uint32_t kMotions = 3, kChanges = 4;  // streams of the seed
 constexpr Eigen::Index kInformationStep = 4;         // every which time of the grid; choice (time)
-// Gaps come first: one stay that lacks weighs more than information can. Theory: it changes by less than this
-// over motions of one arm, per base parameter.
+// Gaps come first: one missing stay weighs more than any information. Theory: information changes by less
+// than this over motions of one arm, per base parameter.
 constexpr double kGapWeight = 100;
 constexpr double kConditionWeight = 0.2;  // choice: a condition that is half counts as 15 % smaller errors
 constexpr double kWorstCondition = 1e10;  // beyond it numbers are rounding; choice

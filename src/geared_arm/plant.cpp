@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kSameTime = 1e-12;  // relative: rounding of a time that is a sum
 
-// Play and deflection are differences of angles; beyond this no angle says more about them. As of one joint.
+// Play and deflection are differences of angles; a finer tolerance would not improve them. As for one joint.
 constexpr double kLargestAngle = 0.1;  // rad
 
 std::vector<simulation::StateTolerance> tolerances(Eigen::Index angles,

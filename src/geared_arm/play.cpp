@@ -118,17 +118,19 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
   if (!(fit.between + fit.between_error > 0)) {
     e.status = diagnosis::Status::out_of_domain;
     e.message = fmt::format(
-        "cannot tell: from flank to flank the motor falls behind its link by {:.2g} rad, as no teeth let it: "
-        "are the encoders exchanged, or does the link's count the other way?",
+        "cannot tell: from flank to flank the motor falls behind its link by {:.2g} rad, which no teeth "
+        "allow: are the encoders exchanged, or does the link's encoder count the other way?",
         -fit.between);
     return;
   }
-  // What friction behind the gap does to the deflection is in the interval, and no teeth that float.
+  // The interval covers what friction behind the gap does to the deflection: such teeth do not float.
   if (fit.residual > settings.worst_residual * std::fabs(fit.play) && fit.play > 3 * fit.error &&
       fit.residual > friction * std::fabs(fit.compliance)) {
     e.status = diagnosis::Status::ambiguous;
     e.message = fmt::format(
-        "cannot tell: the teeth do not rest on their flanks, {:.2g} rad are left of the fit", fit.residual);
+        "cannot tell: the teeth do not rest on their flanks: the fit leaves {:.2g} rad of the deflection: "
+        "move so that the load presses them for longer",
+        fit.residual);
     return;
   }
   const double rest = std::hypot(settings.bend * fit.play, 2 * friction * fit.softest);
@@ -136,8 +138,10 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
   e.angle_upper = fit.play + std::hypot(fit.upper - fit.play, rest);
   if (!(e.angle_upper > 0)) {
     e.status = diagnosis::Status::out_of_domain;
-    e.message =
-        fmt::format("cannot tell: only a play below none, of {:.2g} rad, fits the deflection", fit.play);
+    e.message = fmt::format(
+        "cannot tell: the deflection fits only a negative play of {:.2g} rad: check encoders and "
+        "load",
+        fit.play);
     e.angle_lower = e.angle_upper = kNaN;
     return;
   }
@@ -148,8 +152,8 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
   } else if (e.angle_upper - e.angle_lower > 2 * settings.vague * fit.play) {
     e.status = diagnosis::Status::ambiguous;
     e.message = fmt::format(
-        "cannot tell closer than {:.3g} to {:.3g} rad: the record does not tell play and the deflection of "
-        "the teeth apart",
+        "cannot tell closer than {:.3g} to {:.3g} rad: play and the deflection of the teeth look alike in "
+        "this record: load the teeth more and less",
         e.angle_lower, e.angle_upper);
   } else {
     e.status = diagnosis::Status::ok;
@@ -159,7 +163,7 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
   }
 }
 
-/// Reasons not to look at the deflection first.
+/// First the reasons not to look at the deflection.
 void answer(JointPlay& play, const Rows& rows, bool two_encoders, bool follows, double friction,
             const PlaySettings& settings) {
   diagnosis::Estimate& e = play.estimate;
@@ -168,22 +172,20 @@ void answer(JointPlay& play, const Rows& rows, bool two_encoders, bool follows, 
   } else if (!follows) {
     e.status = diagnosis::Status::out_of_domain;
     e.message =
-        "cannot tell: load_position does not follow motor_position: does it count the other way, or is it "
-        "of "
+        "cannot tell: load_position does not follow motor_position: does it count the other way, or is it of "
         "another joint?";
   } else if (!play.one_flank.empty()) {
     e.status = diagnosis::Status::out_of_domain;
     e.message = play.one_flank;
   } else if (std::min(play.stays[0], play.stays[1]) < settings.least_stays) {
     e.message = fmt::format(
-        "cannot tell: only {} and {} stays on the two flanks, {} on each are needed: a longer record",
+        "cannot tell: only {} and {} stays on the two flanks, {} on each are needed: record for longer",
         play.stays[1], play.stays[0], settings.least_stays);
   } else if (play.disagreement > settings.disagreement) {
     e.status = diagnosis::Status::out_of_domain;
     e.message = fmt::format(
-        "cannot tell: the motor's torque differs from that of the declared chain by {:.0f} % of it: "
-        "declare "
-        "what the arm carries, or fit links and drives (identify)",
+        "cannot tell: the motor's torque differs by {:.0f} % from that of the declared chain: declare what "
+        "the arm carries, or fit links and drives (identify)",
         100 * play.disagreement);
   } else {
     judge(play, rows, friction, settings);

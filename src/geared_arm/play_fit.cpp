@@ -13,14 +13,14 @@
 namespace backlash::geared_arm {
 namespace {
 
-constexpr double kSameColumn = 1e-9;  // of its size: a column that is constant tells nothing
+constexpr double kSameColumn = 1e-9;  // of its size: a column that is constant has no effect
 constexpr double kPowers[] = {1, 0.9, 0.8, 0.73, 2.0 / 3, 0.6, 0.5};  // from a spring to beyond Hertz
-// By how much of itself a spring is harder at the largest load than at none.
+// Relative increase of a spring's stiffness from no load to the largest.
 constexpr double kHardening[] = {0.1, 0.2, 0.5, 1, 2, 5, 10};
 // Ratio of squares up to which a law is not ruled out: none of them is the true one exactly, and what is left
-// comes of other causes too. Choice, see the drawn arms in doc/arm.md.
+// comes of other causes too. Choice, see the drawn arms in doc/evidence/arm.md.
 constexpr double kSameLaw = 1.5;
-constexpr double kLawErrors = 3;      // standard errors by which the record tells two laws apart: choice
+constexpr double kLawErrors = 3;      // standard errors by which the record distinguishes two laws: choice
 constexpr double kOutOfCentre = 0.8;  // of the squares, which an encoder's errors must leave: choice
 constexpr int kMostWaves = 3;         // per turn, of an encoder: more are a gear's, and average out; choice
 constexpr double kTurned = 0.5;       // rad, of travel, below which it is a straight line: choice
@@ -86,7 +86,7 @@ class Flanks {
       least = std::fmin(least, rows_.position[k]), largest = std::fmax(largest, rows_.position[k]);
     return largest - least > kTurned;
   }
-  /// Ratio of squares beyond which the record tells two models apart.
+  /// Ratio of squares beyond which the record distinguishes two models.
   double apart() const { return 1 + kLawErrors * kLawErrors / std::fmax(1, double(n()) / rows_.per_cycle); }
 
  private:

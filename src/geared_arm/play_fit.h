@@ -20,7 +20,7 @@ struct FlankRows {
   std::vector<double> position, speed;  // q, v of the link
   std::vector<int> side;                // 1, -1; 0 where the flank is not certain
   std::vector<std::size_t> stay;        // number of the stay on a flank
-  double per_cycle = 1;                 // rows that tell the same, as they are low-passed
+  double per_cycle = 1;                 // rows that say the same, as they are low-passed
 };
 
 struct FlankPlayFit {

@@ -40,7 +40,7 @@ std::vector<double> grid() {
   return gaps;
 }
 
-/// The rig as the record says it is: links and drives, about those of the file.
+/// The rig as fitted to the record: links and drives, with those of the file as prior.
 arm::ArmFit fitted_to(const arm::ArmRig& rig, const std::vector<arm::ArmMotion>& motions) {
   std::vector<arm::FittedMotion> all;
   for (const arm::ArmMotion& motion : motions) all.push_back({&motion, false});
@@ -68,7 +68,7 @@ std::vector<std::vector<double>> loads_of(const arm::ArmRig& rig,
   return loads;
 }
 
-/// Of the link alone, all other joints moving freely: the least over the poses of the record.
+/// Inertia of the link alone, all other joints moving freely: the least over the poses of the record.
 double least_inertia(const arm::Chain& chain, const std::vector<arm::ArmMotion>& motions, std::size_t joint) {
   double least = INFINITY;
   const auto n = Eigen::Index(chain.size());
@@ -121,15 +121,15 @@ TraverseJoint joint_of(const GearedArm& arm, const arm::ArmFit& fit, const arm::
   return t;
 }
 
-/// Why a joint cannot be looked at at all; empty: it can.
+/// Why a joint cannot be judged at all; empty: it can.
 std::string obstacle(const GearedArm& arm, const arm::ArmFit& fit, std::size_t j) {
   const GearedJoint& joint = arm.joints[j];
-  if (joint.held) return "cannot tell: the joint is held";
+  if (joint.held) return "cannot tell: the joint is held: let it move";
   if (!joint.gear)
     return "needs load_position, or gear.contact of the joint in the rig file: how stiff its teeth are";
   if (!(fit.rig.joints[j].terms[std::size_t(arm::DriveTerm::rotor_inertia)] > 0))
     return "needs load_position, or rotor_inertia of the joint in the rig file";
-  if (!std::isfinite(fit.deviation[j])) return "cannot tell: the joint hardly moves";
+  if (!std::isfinite(fit.deviation[j])) return "cannot tell: the joint hardly moves: move it further";
   return {};
 }
 
@@ -137,8 +137,8 @@ std::string obstacle(const GearedArm& arm, const arm::ArmFit& fit, std::size_t j
 std::string too_fast(const TraverseJoint& joint, double interval) {
   if (interval * kCycleSamples < teeth_cycle(joint)) return {};
   return fmt::format(
-      "cannot tell: a sample each {:.3g} s does not resolve the cycle of {:.3g} s of a motor "
-      "against its link",
+      "cannot tell: samples {:.3g} s apart do not resolve the cycle of {:.3g} s of the motor against its "
+      "link: record faster",
       interval, teeth_cycle(joint));
 }
 
@@ -220,7 +220,9 @@ double largest_of(const CrossingFit& best, std::size_t k, double from, const Tra
     if (other.cost() - best.cost() > settings.rival) return gap;
   }
   throw Refusal{Status::insufficient_data,
-                fmt::format("cannot tell: the turns of the load exclude no play up to {:.2g} rad", kLargest)};
+                fmt::format("cannot tell: the turns of the load rule out no play up to {:.2g} rad: turn the "
+                            "load faster, or record for longer",
+                            kLargest)};
 }
 
 double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Errors& errors,
@@ -233,38 +235,39 @@ double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Erro
                     judged.settings.law * joint.level / stiffness);
 }
 
-/// Times stiffer or softer than declared.
+/// By which factor the teeth are stiffer or softer than declared.
 double off_stiffness(const CrossingFit& fit, std::size_t k) {
   return std::exp(std::fabs(fit.machine()[k][kCrossingStiffness]));
 }
 
-/// A joint that the fit does not describe: what its teeth throw on the others is not known.
+/// A joint that the fit does not describe: the load of its teeth on the others is not known.
 bool is_strange(const CrossingFit& fit, std::size_t k, const TraverseSettings& settings) {
   return fit.misfit(k) > settings.misfit || off_stiffness(fit, k) > settings.far;
 }
 
 void require_others(const std::string& strange) {
   if (strange.empty()) return;
-  throw Refusal{Status::out_of_domain,
-                fmt::format("cannot tell: what the teeth of {} do, which throw this joint as well, is not "
-                            "explained",
-                            strange)};
+  throw Refusal{
+      Status::out_of_domain,
+      fmt::format("cannot tell: the fit does not explain the teeth of {}, which load this joint too: "
+                  "check its gear in the rig file",
+                  strange)};
 }
 
 void require_explained(const Judged& judged) {
   const TraverseSettings& s = judged.settings;
   if (judged.misfit > s.misfit)
     throw Refusal{Status::out_of_domain,
-                  fmt::format("cannot tell: no play, whatever the teeth, explains the torque of the motor "
-                              "where the load turns: {:.2g} times the noise are left",
+                  fmt::format("cannot tell: no play explains the torque of the motor where the load turns: "
+                              "{:.2g} times the noise is left: check friction and contact of the gear",
                               judged.misfit)};
   if (judged.turns < s.least_turns)
     throw Refusal{Status::insufficient_data,
-                  fmt::format("cannot tell: the load turned {} times, {} are needed: a longer record",
+                  fmt::format("cannot tell: the load turned {} times, {} are needed: record for longer",
                               judged.turns, s.least_turns)};
 }
 
-/// That the teeth are some that are known: else what they take for a play, or for none, means nothing.
+/// The fitted teeth must be plausible ones: else a play found with them, or none, means nothing.
 void require_teeth(const CrossingFit& fit, std::size_t k, const Judged& judged) {
   const TraverseSettings& s = judged.settings;
   const double stiffer = std::exp(fit.machine()[k][kCrossingStiffness]);
@@ -277,28 +280,31 @@ void require_teeth(const CrossingFit& fit, std::size_t k, const Judged& judged) 
   if (const double power = fit.machine()[k][kCrossingPower]; power > s.steepest || power < s.flattest)
     throw Refusal{
         Status::out_of_domain,
-        fmt::format("cannot tell: the record fits only teeth whose torque goes with the power {:.2g} of "
-                    "their deflection, which says that it goes with none",
+        fmt::format("cannot tell: the fit asks for teeth whose torque goes with the power {:.2g} of their "
+                    "deflection, which no teeth do: check friction and contact of the gear",
                     power)};
 }
 
-/// That a play, which there is, is known well enough.
+/// A play that there is must be known well enough.
 void require_known(const CrossingFit& fit, std::size_t k, double half, double turns, const Judged& judged) {
   const TraverseSettings& s = judged.settings;
   const double gap = fit.gap(k);
   if (turns < double(s.least_turns))
-    throw Refusal{Status::insufficient_data,
-                  fmt::format("cannot tell: {:.2g} turns of the load tell the play, {} are needed: a longer "
-                              "record",
-                              turns, s.least_turns)};
+    throw Refusal{
+        Status::insufficient_data,
+        fmt::format("cannot tell: {:.2g} turns of the load determine the play, {} are needed: record "
+                    "for longer",
+                    turns, s.least_turns)};
   if (!(half < s.vague * gap))
     throw Refusal{Status::insufficient_data,
-                  fmt::format("cannot tell: the turns of the load tell the play only from {:.2g} to {:.2g} "
-                              "rad; a soft start of the teeth would look alike",
+                  fmt::format("cannot tell: the turns of the load show a play between {:.2g} and {:.2g} rad "
+                              "only; a soft start of the teeth would look alike",
                               std::fmax(0, gap - half), gap + half)};
   if (const double rival = rival_of(fit, k, s); std::isfinite(rival))
-    throw Refusal{Status::ambiguous,
-                  fmt::format("cannot tell: {:.3g} and {:.3g} rad explain the record alike", gap, rival)};
+    throw Refusal{
+        Status::ambiguous,
+        fmt::format("cannot tell: {:.3g} and {:.3g} rad explain the record alike: record for longer", gap,
+                    rival)};
 }
 
 void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const CrossingFit::Errors& errors,
@@ -322,8 +328,7 @@ void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const 
   e.backlash_angle = gap, e.angle_lower = gap - half, e.angle_upper = gap + half;
   e.message = fmt::format(
       "motor's side alone, against the link that the chain's load moves: the gap was crossed {} times; "
-      "{:.2g} "
-      "times the noise are left",
+      "{:.2g} times the noise are left",
       judged.crossings, judged.misfit);
 }
 
@@ -337,8 +342,8 @@ CrossingFit solved(const CrossingData& data) {
   return fit;
 }
 
-void tell(const GearedArm& arm, const CrossingData& data, std::vector<JointTraverse>& out,
-          const TraverseSettings& settings) {
+void report(const GearedArm& arm, const CrossingData& data, std::vector<JointTraverse>& out,
+            const TraverseSettings& settings) {
   const CrossingFit fit = solved(data);
   const std::vector<CrossingFit::Errors> errors = fit.errors();
   std::vector<std::vector<Crossing>> crossings = crossings_of(data, fit);
@@ -354,17 +359,19 @@ void tell(const GearedArm& arm, const CrossingData& data, std::vector<JointTrave
     one.misfit = fit.misfit(k);
     one.estimate = diagnosis::estimate_or_refusal("gap_traverse", [&](diagnosis::Estimate& e) {
       if (!joint.crosses)
-        throw Refusal{Status::out_of_domain, "cannot tell: the load never turns for certain"};
+        throw Refusal{
+            Status::out_of_domain,
+            "cannot tell: the load never clearly turns: move so that gravity or acceleration reverses it"};
       if (joint.lesser < settings.friction * joint.coulomb)
         throw Refusal{
             Status::out_of_domain,
             fmt::format("cannot tell: on one flank the load reaches {:.2g} N m, which the motor's dry "
-                        "friction of {:.2g} N m hides: {:.2g} times that is needed",
+                        "friction of {:.2g} N m hides: {:.2g} times that friction is needed",
                         joint.lesser, joint.coulomb, settings.friction)};
       if (joint.slow_torque > settings.disagreement * joint.most)
         throw Refusal{Status::out_of_domain,
-                      fmt::format("cannot tell: links and drives, fitted to the record, leave {:.2g} N m of "
-                                  "the torque of the motor",
+                      fmt::format("cannot tell: a fit of links and drives to the record leaves {:.2g} N m of "
+                                  "the torque of the motor: declare payload and friction of the arm",
                                   joint.slow_torque)};
       std::string others;
       for (const std::size_t i : strange)
@@ -402,7 +409,7 @@ std::vector<JointTraverse> traverses_of(const GearedArm& arm, const arm::ArmReco
       const TraverseJoint joint =
           joint_of(arm, fit, record, loads[j], least_inertia(chain, motions, j), j, settings);
       out[j].estimate.message = too_fast(joint, motions.front().interval);
-      // What its teeth throw on the other joints must be known, be it roughly.
+      // The load of its teeth on the other joints must be known, at least roughly.
       if (motions.front().interval * kFelt < teeth_cycle(joint)) joints.push_back(joint);
     }
     const auto looked_at = [&](const TraverseJoint& joint) {
@@ -416,8 +423,9 @@ std::vector<JointTraverse> traverses_of(const GearedArm& arm, const arm::ArmReco
     if (data.windows.empty())
       throw Refusal{
           Status::out_of_domain,
-          "cannot tell: at no time that begins with all teeth on a flank for certain does a load turn"};
-    tell(arm, data, out, settings);
+          "cannot tell: the load turns at no time that begins with all teeth on a flank: move the joints one "
+          "after the other"};
+    report(arm, data, out, settings);
   } catch (const Refusal& refusal) {
     refuse_all(refusal);
   }

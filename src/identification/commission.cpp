@@ -18,16 +18,16 @@ const char* unit_of_gap(const diagnosis::WaveformSettings& machine) {
   return machine.angular ? "rad" : "m";
 }
 
-/// What the sensor's gain came out as, as a share of torque; 0 where that is within what was known of it.
+/// By which share of the torque the sensor's gain is off; 0 where that is within its declared uncertainty.
 double torque_in_doubt(const diagnosis::WaveformSettings& declared,
                        const diagnosis::WaveformCommissioning& found) {
   const double off = std::abs(std::log(found.machine.sensor_gain / declared.sensor_gain));
-  const bool told = off > kGainSpreads * declared.spread.sensor_gain &&
-                    off > kGainErrors * found.machine.spread.sensor_gain;
-  return told ? off : 0;
+  const bool clear = off > kGainSpreads * declared.spread.sensor_gain &&
+                     off > kGainErrors * found.machine.spread.sensor_gain;
+  return clear ? off : 0;
 }
 
-/// Of what is told by a torque over a motion.
+/// Of what a torque over a motion determines.
 bool is_torque(const std::string& unit) {
   return unit.find('N') != std::string::npos || unit.find("kg") != std::string::npos;
 }
@@ -52,18 +52,17 @@ void put_parameters(Identification& result, const diagnosis::WaveformCommissioni
 void warn(Identification& result, const diagnosis::WaveformCommissioning& found, double doubt) {
   if (doubt > 0)
     result.warnings.push_back(fmt::format(
-        "the torque sensor reads {:.3g} times what motor_torque makes it hold: where not the sensor is off "
-        "but motor_torque, inertias, stiffnesses, damping and friction are by {:.2g} %, which their errors "
-        "hold",
+        "the torque sensor reads {:.3g} times what it should by motor_torque: if the sensor is right, "
+        "inertias, stiffnesses, damping and friction are wrong by {:.2g} %, which is part of their errors",
         found.machine.sensor_gain, 100 * doubt));
   if (!found.untold.empty())
-    result.warnings.push_back("the records do not tell " + joined(found.untold) +
+    result.warnings.push_back("the records do not determine " + joined(found.untold) +
                               ": what the rig file says of it is kept");
   for (const diagnosis::WaveformCommissioning::State& state : found.states)
     if (!state.position) {
       result.warnings.push_back(fmt::format(
-          "torque alone does not tell the scale of inertias, stiffnesses and play: all are known to "
-          "{:.2g} % together; a record with motor_position or a backlash told with its uncertainty "
+          "torque alone does not give the scale of inertias, stiffnesses and play: all are known to "
+          "{:.2g} % together; a record with motor_position or a backlash declared with its uncertainty "
           "sharpens it",
           100 * found.machine.common_scale));
       break;
@@ -73,12 +72,12 @@ void warn(Identification& result, const diagnosis::WaveformCommissioning& found,
 }  // namespace
 
 Identification commission(const rig_file::RigFile& file, const std::vector<record::Record>& records) {
-  const bool told = file.backlash_error.has_value();
+  const bool known = file.backlash_error.has_value();
   Identification result;
   result.rig = file.rig;
   result.commissioning =
-      diagnosis::commission_waveform(records, *file.diagnosis.waveform, told ? file.rig.mesh.backlash : kNaN,
-                                     told ? *file.backlash_error : kNaN);
+      diagnosis::commission_waveform(records, *file.diagnosis.waveform, known ? file.rig.mesh.backlash : kNaN,
+                                     known ? *file.backlash_error : kNaN);
   const diagnosis::WaveformCommissioning& found = *result.commissioning;
   ProcedureReport report{"waveform", {}, ""};
   static const char* const kNames[] = {"torque", "position"};

@@ -21,7 +21,7 @@ std::map<std::string, signal::Measured> combine_findings(const std::vector<Findi
     declared[i] = rig_file::servo_parameter(names[i]).get(rig);
     size[i] = declared[i] != 0 ? kDeclaredUncertainty * std::fabs(declared[i]) : 1;
   }
-  // Deviations from the declared values in units of what these are uncertain by.
+  // Deviations from the declared values, in units of their uncertainties.
   Eigen::MatrixXd information = Eigen::MatrixXd::Identity(n, n);
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(n);
   struct Row {
@@ -29,7 +29,7 @@ std::map<std::string, signal::Measured> combine_findings(const std::vector<Findi
     double b;
   };
   std::vector<Row> rows;
-  std::vector<bool> told(n, false);
+  std::vector<bool> found(n, false);
   for (const Finding& finding : findings) {
     const double error = finding.measured.standard_error;
     if (!(error > 0) || !std::isfinite(finding.measured.value)) continue;
@@ -39,7 +39,7 @@ std::map<std::string, signal::Measured> combine_findings(const std::vector<Findi
       if (i == n) continue;
       row.a[i] = factor * size[i] / error;
       row.b -= factor * declared[i] / error;
-      told[i] = true;
+      found[i] = true;
     }
     information += row.a * row.a.transpose();
     gradient += row.a * row.b;
@@ -49,11 +49,11 @@ std::map<std::string, signal::Measured> combine_findings(const std::vector<Findi
   const Eigen::VectorXd deviation = covariance * gradient;
   double chi2 = 0;
   for (const Row& row : rows) chi2 += std::pow(row.b - row.a.dot(deviation), 2);
-  const double freedom = double(rows.size()) - double(std::count(told.begin(), told.end(), true));
+  const double freedom = double(rows.size()) - double(std::count(found.begin(), found.end(), true));
   const double growth = freedom > 0 ? std::sqrt(std::max(1.0, chi2 / freedom)) : 1;
   std::map<std::string, signal::Measured> result;
   for (Eigen::Index i = 0; i < n; ++i)
-    if (told[i])
+    if (found[i])
       result[names[i]] = {declared[i] + size[i] * deviation[i],
                           growth * size[i] * std::sqrt(covariance(i, i))};
   return result;

@@ -25,7 +25,7 @@ std::map<std::string, Value> values_by_table(const std::map<std::string, Value>&
   return all;
 }
 
-/// The weight that was fitted, in place of the declared one; what no record showed stays.
+/// The fitted weight in place of the declared one; what no record showed stays.
 void replace_weight(rig_file::RigDocument& document, const Identification& found) {
   const auto amplitude = found.parameters.find("gravity_amplitude");
   if (amplitude == found.parameters.end() || std::isinf(amplitude->second.standard_error)) return;
@@ -35,7 +35,7 @@ void replace_weight(rig_file::RigDocument& document, const Identification& found
                              {model::term_text(*term)});
 }
 
-/// rad, rms: of motor minus load position what the machine leaves beyond noise; NaN where that cannot be
+/// rad, rms: what the machine leaves of motor minus load position beyond noise; NaN where that cannot be
 /// said.
 double unexplained_deflection(const Identification& found) {
   const auto error = found.channels.find("deflection");

@@ -66,14 +66,14 @@ std::vector<std::string> parameter_names(const model::Rig& rig) {
   std::vector<std::string> names;
   for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     if (p.kind == rig_file::ParameterKind::start_in_gap) continue;
-    if (rig.coupled && !rig_file::told_by_deflection(p)) continue;
+    if (rig.coupled && !rig_file::shown_by_deflection(p)) continue;
     const bool skew = p.kind == rig_file::ParameterKind::encoder_skew && p.known_to(rig);
     if (p.get(rig) != 0 || skew) names.push_back(p.name);
   }
   return names;
 }
 
-/// All but the first and the last take the torque for this joint's alone.
+/// All but the first and the last assume that the torque is this joint's alone.
 std::vector<Procedure> procedures_for(const model::Rig& rig) {
   if (rig.mesh.rigid) return {{"one_inertia", run_one_inertia}};
   if (rig.link_locked) return {{"locked_output", run_locked_output}};
@@ -85,7 +85,7 @@ std::vector<Procedure> procedures_for(const model::Rig& rig) {
 void put_skew_back(IdentificationCase& c) {
   const std::string& name =
       rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew).name;
-  if (c.skew.standard_error == 0) return;  // no record tells it
+  if (c.skew.standard_error == 0) return;  // no record determines it
   c.result.rig.encoder_skew += c.skew.value;
   const auto fitted = c.result.parameters.find(name);
   if (fitted == c.result.parameters.end())
@@ -131,7 +131,7 @@ void warn_of_asymmetry(IdentificationCase& c) {
 /// Friction of one inertia builds up over a travel after each reversal, which the noise does not know of.
 constexpr double kBuildUp = 0.005;  // simulation: of the torque
 
-/// A channel of which the machine leaves more than this share of the square, beyond noise, is not explained
+/// A channel of which the machine leaves more than this share of the squares, beyond noise, is not explained
 /// by it: its mean alone leaves 1.
 constexpr double kMostLeft = 0.5;    // choice
 constexpr double kMostNoise = 0.99;  // theory: of a square; a channel of noise alone shows nothing to explain
@@ -141,7 +141,7 @@ double left_beyond_noise(const ChannelError& c) {
   return (c.error * c.error - noise) / (1 - noise);
 }
 
-/// A machine of another kind than the rig file's has no values by this one: a fit makes them anything.
+/// A machine of another kind than the rig file's has no such values: a fit would make them arbitrary.
 void withhold_unexplained(Identification& result) {
   if (result.several) return;
   for (const auto& [name, channel] : result.channels) {
@@ -154,7 +154,7 @@ void withhold_unexplained(Identification& result) {
     result.unexplained = result.unexplained ? *result.unexplained + ". " + reason : reason;
     for (auto& [parameter, measured] : result.parameters) {
       const bool shown = name == "torque" || result.one_inertia ||
-                         rig_file::told_by_deflection(rig_file::servo_parameter(parameter));
+                         rig_file::shown_by_deflection(rig_file::servo_parameter(parameter));
       if (shown) measured.standard_error = std::numeric_limits<double>::infinity();
     }
   }
@@ -170,7 +170,7 @@ void warn_of_misfit(Identification& result) {
   const double build_up = result.one_inertia ? kBuildUp : 0;
   for (const auto& [name, channel] : result.channels)
     if (left_beyond_noise(channel) <= kMostLeft &&
-        channel.error > std::max(kMisfit * channel.floor, std::hypot(channel.floor, build_up)))
+        channel.error > std::max(kShowsMissingEffect * channel.floor, std::hypot(channel.floor, build_up)))
       result.warnings.push_back(
           fmt::format("{}: the fitted model leaves {} where noise alone would leave {}: the machine has an "
                       "effect that the "
@@ -183,10 +183,10 @@ void require_served(const model::Rig& rig) {
   if (rig.input_coupling.rigid && rig.link_locked) return require_locked_output(rig);
   if (!model::has_two_inertias(rig))
     throw CannotIdentify(
-        std::string("identify knows machines of one inertia (mesh: rigid), of two (rigid couplings, free "
-                    "link), with a locked output (rigid input coupling), and with a torque sensor (elastic "
-                    "input coupling, mesh that is linear, a power law or Hunt-Crossley, damping > 0 of motor "
-                    "and couplings, no terms); this rig has ") +
+        std::string(
+            "identify knows one inertia (mesh: rigid), two (rigid couplings, free link), a locked "
+            "output (rigid input coupling), and a torque sensor (elastic input coupling; mesh linear, "
+            "a power law or Hunt-Crossley; damping > 0 of motor and couplings; no terms); this rig has ") +
         (rig.input_coupling.rigid ? "a rigid" : "an elastic") + " input coupling, " +
         (rig.output_coupling.rigid ? "a rigid" : "an elastic") + " output coupling and a " +
         (rig.link_locked ? "locked" : "free") + " link");

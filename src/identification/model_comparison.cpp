@@ -58,7 +58,7 @@ std::vector<Engagement> find_engagements(const ComparedRecord& r, const Comparis
     }
     side = reached;
   }
-  // Teeth that are thrown back at once make no engagement of their own.
+  // Teeth that are thrown back at once do not count as an engagement.
   const auto too_short = [&](const Engagement& e) { return e.to < e.middle + std::size_t(before); };
   found.erase(std::remove_if(found.begin(), found.end(), too_short), found.end());
   return found;

@@ -22,7 +22,7 @@ double difference(const signal::Measured& a, const signal::Measured& b, const Se
   return error > 0 ? apart / error : 0;
 }
 
-/// The largest between any two records; 0 for a value that one of them does not tell.
+/// The largest between any two records; 0 for a value that one of them does not determine.
 double largest_difference(const std::string& name, const std::vector<RecordAlone>& records,
                           const SeveralSettings& settings) {
   double largest = 0;
@@ -71,8 +71,7 @@ std::string description(const SeveralMachines& several, const std::map<std::stri
   for (const RecordAlone& r : several.records) left = std::max(left, r.left);
   std::string text = fmt::format(
       "The records contradict each other: each by itself is met by the declared model (at most {:.3g} times "
-      "the "
-      "noise is left, of all together {:.3g} times), with other values: ",
+      "the noise is left, of all together {:.3g} times), with other values: ",
       left, several.together);
   for (std::size_t i = 0; i < std::min(kMostValues, several.names.size()); ++i) {
     const std::string& name = several.names[i];
@@ -84,8 +83,7 @@ std::string description(const SeveralMachines& several, const std::map<std::stri
   }
   return text +
          ". They are of different machines, of one that has changed between them, or of one with an effect "
-         "that "
-         "none of them shows by itself";
+         "that none of them shows by itself";
 }
 
 }  // namespace backlash::identification

@@ -8,6 +8,13 @@
 
 namespace backlash::model {
 
+void GearTrain::brake_motor() {
+  smooth_ = false;
+  braked_ = true;
+  if (dry_ends_.empty() || dry_ends_.front().part != kMotor)
+    dry_ends_.insert(dry_ends_.begin(), {kMotor, {}});
+}
+
 const FrictionLimits& GearTrain::limits(const DryEnd& end, const EndFriction& friction) const {
   return end.part == kMotor ? friction.motor : friction.load;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/record/numbers.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "check_parts.h"
 
@@ -39,23 +40,26 @@ void look_for_numbers(RecordLook& look, Channel channel) {
   if (count == 0) return;
   const std::string& name = channel_name(channel);
   look.say(FindingKind::not_finite, name, look.record.time[first], look.record.time[last], count,
-           Consequence::noted,
-           fmt::format("{}: no number in {}, the first at {:.6g} s: estimates that need it refuse the record",
-                       name, counted(count, "sample"), look.record.time[first]));
+           Consequence::mended,
+           fmt::format("{}: no number in {}, the first at {:.6g} s: {}", name, counted(count, "sample"),
+                       look.record.time[first],
+                       double(x.size() - count) < kHardlyRecorded * double(x.size())
+                           ? "taken as absent"
+                           : "they count as lost samples"));
 }
 
 void drop(RecordLook& look, Channel channel) {
   look.record.column(channel).clear();
 }
 
-/// rad at the load: farther than that one side does not move while the other stands.
+/// rad at the load: the farthest that one side moves while the other stands.
 double loosest(const RecordLook& look) {
   if (!look.declared.looseness) return 0;
   return kLooserThanDeclared *
          look.declared.looseness(look.declared.axis_ratio * travel_of(look.record, Channel::motor_torque));
 }
 
-/// The channel is of one value. What follows depends on what the others do.
+/// The channel has one value throughout. What follows depends on the other channels.
 void say_dead(RecordLook& look, Channel channel) {
   const Record& r = look.record;
   const double value = r.column(channel).front() + 0.0, motor = travel_of(r, Channel::motor_position);
@@ -114,7 +118,7 @@ void say_dead(RecordLook& look, Channel channel) {
   }
 }
 
-/// A load whose position was computed from the motor's shows no play, whatever there is.
+/// A load position that was computed from the motor's shows no play, however much there is.
 void look_for_copy(RecordLook& look) {
   const std::vector<double>&motor = look.record.column(Channel::motor_position),
         &load = look.record.column(Channel::load_position);
@@ -144,6 +148,7 @@ void check_dead(RecordLook& look) {
     const double first = look.record.column(channel).front();
     if (std::isfinite(first) && !(travel_of(look.record, channel) > 0)) say_dead(look, channel);
   }
+  if (!look.declared.shares_stamps) keep_rows_with_numbers({&look.record});
   look_for_copy(look);
 }
 

@@ -45,7 +45,7 @@ void cut_frozen(RecordLook& look, Channel channel, std::size_t begin, std::size_
                 const std::string& while_what);
 constexpr std::size_t kLongRun = 20;  // choice: samples of one value
 
-/// Channels without numbers, of one value throughout, or that are another channel once more.
+/// Channels without numbers, with one value throughout, or that repeat another channel.
 void check_dead(RecordLook& look);
 
 /// Stretches in which a channel stands still while what it measures moves; sets `held` and `rate`.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/record/even_grid.h"
+#include "backlash_diagnosis/record/numbers.h"
 #include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "check_parts.h"
@@ -16,6 +18,7 @@ constexpr double kMakesUp = 0.5;  // choice: of the way in as many samples again
 constexpr double kHeld = 0.25;    // choice: share of samples; what rounds and rests shows up to 0.1
 constexpr std::size_t kFewestMoving = 200;  // choice: samples of motion, to say a share
 constexpr std::size_t kFewestLevels = 20;   // choice: values of a torque that is measured and not switched
+constexpr double kTogether = 0.8;           // choice: share of new rows, of channels that come together
 constexpr double kRegular = 0.8;            // choice: share of the values that last equally long
 constexpr double kFarther = 3;              // choice: so much farther than elsewhere the other position goes
 constexpr double kOutside = 0.1;            // choice: share of the record that must show how both move
@@ -53,7 +56,7 @@ double held_while_moving(const std::vector<double>& x, double step) {
   return fresh + held < kFewestMoving ? 0 : double(held) / double(fresh + held);
 }
 
-/// The same of a torque, whose values repeat by rights where it is switched or rounded: here each lasts
+/// The same of a torque, whose values may well repeat where it is switched or rounded: held, each lasts
 /// equally long.
 double held_regularly(const std::vector<double>& x) {
   const std::vector<Run> runs = runs_of(x, 1);
@@ -67,6 +70,26 @@ double held_regularly(const std::vector<double>& x) {
                                      [&](double length) { return std::fabs(length - usual) <= 1; });
   if (levels < kFewestLevels || usual < 2 || double(regular) < kRegular * double(runs.size())) return 0;
   return 1 - double(runs.size()) / double(x.size());
+}
+
+/// Rows with a new value; where the value rests, one in each of `period` rows.
+std::vector<bool> new_values(const std::vector<double>& x, double period) {
+  const auto longest = std::size_t(std::lround(period));
+  std::vector<bool> rows(x.size(), false);
+  std::size_t since = longest;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    rows[i] = ++since >= longest || (i > 0 && x[i] != x[i - 1]);
+    if (rows[i]) since = 0;
+  }
+  return rows;
+}
+
+/// Share of some rows that are also in others.
+double shared(const std::vector<bool>& rows, const std::vector<bool>& others) {
+  std::size_t count = 0, both = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (rows[i]) ++count, both += others[i];
+  return double(both) / double(count);
 }
 
 bool is_torque(Channel channel) {
@@ -88,6 +111,35 @@ void look_at_held(RecordLook& look, ChannelState& state) {
                        "{:.4g} Hz, not "
                        "at {:.4g} Hz; what is faster than that is not in it",
                        name, 100 * state.held, state.rate, 1 / look.interval));
+}
+
+/// The held position with the fewest new values; null: none. A torque may be held by the drive itself, and is
+/// then what it says all the time; a position is not.
+const ChannelState* slowest_held(const std::vector<ChannelState>& channels) {
+  const ChannelState* slowest = nullptr;
+  for (const ChannelState& state : channels)
+    if (state.held >= kHeld && is_smooth(state.channel) && (!slowest || state.held > slowest->held))
+      slowest = &state;
+  return slowest;
+}
+
+/// Rows of new values remain, where the other held channels are new in them too.
+void leave_out_held(RecordLook& look) {
+  const ChannelState* slowest = slowest_held(look.out.channels);
+  if (!slowest || look.declared.shares_stamps) return;
+  const std::vector<bool> rows = new_values(look.record.column(slowest->channel), 1 / (1 - slowest->held));
+  for (const ChannelState& state : look.out.channels)
+    if (state.held >= kHeld && (is_smooth(state.channel) || is_torque(state.channel)) &&
+        shared(rows, new_values(look.record.column(state.channel), 1 / (1 - state.held))) < kTogether)
+      return;
+  keep_rows(look.record, rows);
+  look.interval = look.record.sampling_interval();
+  for (Finding& finding : look.out.findings) {
+    if (finding.kind != FindingKind::held_samples || finding.channel != channel_name(slowest->channel))
+      continue;
+    finding.consequence = Consequence::mended;
+    finding.message += "; only the rows with new values are used";
+  }
 }
 
 struct Follow {
@@ -118,7 +170,7 @@ Follow follow_of(const std::vector<double>& x, const std::vector<double>& y, con
   return follow;
 }
 
-/// x stands still while y, which it follows elsewhere, goes farther than the two are ever apart.
+/// x stands still while y, which it follows elsewhere, moves farther than the two are ever apart.
 void look_at_frozen(RecordLook& look, Channel channel, const std::vector<double>& y,
                     const std::string& other) {
   const std::vector<double>& x = look.record.column(channel);
@@ -134,7 +186,7 @@ void look_at_frozen(RecordLook& look, Channel channel, const std::vector<double>
   }
 }
 
-/// A torque that is noisy elsewhere repeats no value so often but where it is limited or switched off.
+/// A torque that is noisy elsewhere repeats a value that often only where it is limited or switched off.
 void look_at_frozen_torque(RecordLook& look, const ChannelState& state) {
   const std::vector<double>& x = look.record.column(state.channel);
   if (!(state.noise > kMoves * signal::smallest_step(x))) return;
@@ -184,6 +236,7 @@ void check_repeats(RecordLook& look) {
     }
     look.out.channels.push_back(state);
   }
+  leave_out_held(look);
   const std::vector<double>&motor = r.column(Channel::motor_position),
         &load = r.column(Channel::load_position), &speed = r.column(Channel::motor_velocity);
   if (motor.empty() || !all_finite(motor)) return;

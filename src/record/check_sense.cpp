@@ -46,7 +46,7 @@ void look_for_position(RecordLook& look, Channel speed) {
   }
 }
 
-/// A speed against the slope of its own position.
+/// Compares a speed with the slope of its own position.
 void look_at_speed(RecordLook& look, Channel speed, Channel position) {
   const std::vector<double>&v = look.record.column(speed), &x = look.record.column(position),
         &t = look.record.time;
@@ -70,7 +70,7 @@ void look_at_speed(RecordLook& look, Channel speed, Channel position) {
             name, line.slope, of));
 }
 
-/// The positions come apart by more, and more steadily, than play and deflection do.
+/// The positions come apart further, and more steadily, than play and deflection explain.
 void look_at_drift(RecordLook& look) {
   const std::vector<double>&motor = look.record.column(Channel::motor_position),
         &load = look.record.column(Channel::load_position), &t = look.record.time;

@@ -14,9 +14,10 @@ namespace {
 
 constexpr double kMissing = 0.5;   // theory: of an interval, half of what one lost sample adds
 constexpr double kJitters = 0.01;  // choice: of an interval, standard deviation worth a look at the motion
-constexpr double kTells = 0.5;     // theory: one of the two readings leaves nothing where the other is wrong
-constexpr double kOnGrid = 0.5;    // theory: of an interval, beyond which a stamp is nearer to another row
-constexpr double kSteady = 0.2;    // choice: of the speed, by which it may change across a step of the clock
+constexpr double kClearlyBetter =
+    0.5;                         // theory: one of the two readings leaves nothing where the other is wrong
+constexpr double kOnGrid = 0.5;  // theory: of an interval, beyond which a stamp is nearer to another row
+constexpr double kSteady = 0.2;  // choice: of the speed, by which it may change across a step of the clock
 constexpr double kClearMotion = 20;  // choice: steps of the sensor that a speed must pass to be one
 
 /// Samples missing between i and i + 1: a late sample is followed by a short interval, a lost one is not.
@@ -28,8 +29,8 @@ std::size_t missing_after(const std::vector<double>& time, std::size_t i, double
   return around < kMissing ? 0 : std::size_t(std::lround(std::min(own - 1, around)));
 }
 
-/// The clock jumped between i and i + 1 by more than the motion did: the speed before and after, which is the
-/// same, makes the way in one interval.
+/// The clock jumped between i and i + 1 by more than the motion did: the speed before and after, being the
+/// same, covers the way in one interval.
 bool is_clock_step(const RecordLook& look, std::size_t i) {
   const std::vector<double>& t = look.record.time;
   if (i < 3 || i + 4 >= t.size()) return false;
@@ -87,7 +88,7 @@ bool samples_are_even(const RecordLook& look) {
       by_stamps += std::pow(on_line - share * way, 2);
       evenly += std::pow(on_line - 0.5 * way, 2);
     }
-    return evenly < kTells * by_stamps;
+    return evenly < kClearlyBetter * by_stamps;
   }
   return false;
 }

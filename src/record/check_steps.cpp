@@ -58,8 +58,8 @@ bool has_shape(const std::vector<double>& e, std::size_t i) {
          std::fabs(e[i + 1] + 0.5 * e[i]) < kShape * std::fabs(e[i]);
 }
 
-/// Values that are wild for up to kShortest samples from i + 1 on: the last of them, else i. The position
-/// goes on behind them as it went before.
+/// The last of up to kShortest wild samples from i + 1 on, else i. Wild: the position
+/// goes on behind them as before.
 std::size_t end_of_wild(const std::vector<double>& x, const std::vector<double>& t, std::size_t i,
                         double least) {
   const double speed = (x[i] - x[i - 1]) / (t[i] - t[i - 1]);

@@ -25,8 +25,8 @@ std::vector<double> steps_over(const std::vector<double>& x, std::size_t lag) {
   return steps;
 }
 
-/// Motion goes twice as far in two samples as in one, noise as far. Two sources in turn go far from one to
-/// the other and hardly anywhere within each.
+/// Motion goes twice as far in two samples as in one, noise just as far as in one. Two sources in turn go far
+/// from one to the other and hardly anywhere within each.
 bool of_two_sources(const std::vector<double>& x) {
   const double next = signal::median(steps_over(x, 1)), quantum = signal::smallest_step(x);
   if (!(next > std::max(kInTurn * quantum, kApart * signal::peak_to_peak(x)))) return false;

@@ -7,6 +7,7 @@
 #include <deque>
 #include <istream>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string_view>
@@ -36,6 +37,11 @@ bool has_required_channel(const std::vector<Channel>& channels) {
   return std::any_of(channels.begin(), channels.end(), [](Channel channel) {
     return std::find(kBacklashChannels.begin(), kBacklashChannels.end(), channel) != kBacklashChannels.end();
   });
+}
+
+/// As most programs write what was not measured; an infinity is a number that went wrong.
+bool is_no_number(std::string_view text) {
+  return text == "nan" || text == "NaN" || text == "NAN" || text == "-nan";
 }
 
 class Reader {
@@ -161,6 +167,7 @@ class Reader {
 
   double read_field(std::size_t i) {
     const bool of_clock = clock_ && i == time_column_;
+    if (i != time_column_ && is_no_number(fields_[i])) return std::numeric_limits<double>::quiet_NaN();
     const ParsedNumber number = of_clock ? clock_->read(fields_[i]) : parse_number(fields_[i]);
     if (!number)
       lines_.fail(printable(names_[i]) + " = " + in_quotes(fields_[i]) + ": " +

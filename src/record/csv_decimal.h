@@ -12,7 +12,7 @@ namespace backlash::record {
 
 class DecimalMark {
  public:
-  /// Whether a comma may be one: not where it separates fields.
+  /// Whether a comma may be a decimal mark: not where it separates fields.
   void allow_comma(bool allowed) { comma_allowed_ = allowed; }
 
   /// The text with a decimal point; BadData where the mark is another than before.

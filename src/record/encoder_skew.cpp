@@ -54,7 +54,8 @@ Rows rows_of(const DrivenPositions& p, double cutoff) {
   const auto stride = std::size_t(std::max(1L, std::lround(1 / (2 * kOversampling * cutoff * p.interval))));
   const std::size_t n = motor.size();
   const std::size_t count = n > 2 * ends ? (n - 2 * ends + stride - 1) / stride : 0;
-  if (count < 4 * std::size_t(kColumns)) throw CannotIdentify("too short to tell the skew of the encoders");
+  if (count < 4 * std::size_t(kColumns))
+    throw CannotIdentify("too short to estimate the skew of the encoders");
   Rows rows{Eigen::MatrixXd(Eigen::Index(count), kColumns), Eigen::VectorXd(Eigen::Index(count)),
             rms(torque) / std::max(rms(speed), 1e-300)};
   for (std::size_t i = 0; i < count; ++i) {
@@ -94,7 +95,7 @@ signal::Measured skew_in_band(const DrivenPositions& p, double cutoff) {
 signal::Measured encoder_skew(const DrivenPositions& positions) {
   const std::size_t n = positions.motor.size();
   if (n < kFewest || positions.torque.size() != n || positions.load.size() != n)
-    throw CannotIdentify("too short, or without a column, to tell the skew of the encoders");
+    throw CannotIdentify("too short, or without a column, to estimate the skew of the encoders");
   const double cutoff = std::min(kBand, kWidestBand / positions.interval);
   signal::Measured skew = skew_in_band(positions, cutoff);
   const double slow = skew_in_band(positions, 0.5 * cutoff).value;

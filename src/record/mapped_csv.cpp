@@ -176,7 +176,7 @@ void MappedCsv::refuse() const {
 
 void MappedCsv::read_row(std::string_view line) {
   if (!split_fields(line, separator_, fields_)) lines_.fail("a quote that does not enclose a field");
-  // A separator behind the last name is none in the rows of some loggers.
+  // Some loggers write a separator behind the last name and none in the rows.
   std::size_t least = header_.size();
   while (!by_number_ && least > 0 && header_[least - 1].empty()) --least;
   if (fields_.size() < least || fields_.size() > header_.size())

@@ -63,7 +63,7 @@ void look_at_travel(const DrivenMotion& m, const DeclaredMotion& declared, std::
   const double times = std::copysign(load.norm() / motor.norm(), along);
   const double apart = std::abs(times - 1) * signal::peak_to_peak(m.motor);
   const double torque = signal::peak_to_peak(m.torque);
-  // As of a motor that is held while the load is moved.
+  // As with a motor that is held while the load is moved.
   if (declared.looseness && apart < kLooserThanDeclared * declared.looseness(torque)) return;
   if (times < 0)
     refuse(found, FindingKind::sign, "load_position",
@@ -82,7 +82,7 @@ void look_at_travel(const DrivenMotion& m, const DeclaredMotion& declared, std::
                        times));
 }
 
-/// q_M - q_L = o + s q_L + d w_L + e a_L: what takes the load along is ahead of it, e > 0, by J_L / k. A load
+/// q_M - q_L = o + s q_L + d w_L + e a_L: what accelerates the load is ahead of it, e > 0, by J_L / k. A load
 /// encoder that is late by d adds -d^2 / 2.
 void look_at_lag(const DrivenMotion& m, std::vector<Finding>& found) {
   const std::vector<double> motor = smoothed(m.motor, m.interval), load = smoothed(m.load, m.interval),
@@ -106,7 +106,7 @@ void look_at_lag(const DrivenMotion& m, std::vector<Finding>& found) {
              "load_position is ahead of motor_position whenever both gain speed: the load would pull the "
              "motor; the "
              "columns are in each other's place");
-  } catch (const CannotIdentify&) {  // a motion that does not tell them apart
+  } catch (const CannotIdentify&) {  // a motion that does not distinguish them
   }
 }
 
@@ -123,12 +123,12 @@ Driven driven(const std::vector<double>& torque, const std::vector<double>& posi
   return d;
 }
 
-/// Inertia, and shares of it and of friction in the torque; of all that was asked what is left.
+/// Inertia, shares of inertia and friction in the torque, and the share of the torque that is left.
 struct Spent {
   double inertia = 0, inertia_share = 0, friction_share = 0, left = 1;
 };
 
-/// All 0 of a motion that does not tell them apart. `weight`: it may also be spent on gravity or a spring.
+/// All 0 of a motion that does not distinguish them. `weight`: it may also be spent on gravity or a spring.
 Spent spent(const Driven& d, bool weight, bool linear) {
   const auto n = Eigen::Index(d.torque.size());
   const double stands = kStands * varying(d.speed).norm() / std::sqrt(double(n)),
@@ -196,7 +196,7 @@ bool load_moves(const DrivenMotion& m) {
 
 void look_at_inertia(const DrivenMotion& m, const Driven& d, const DeclaredMotion& declared,
                      std::vector<Finding>& found) {
-  // As of the driver by itself where the load stands; either where its position is not recorded.
+  // As of the motor by itself where the load stands; either where its position is not recorded.
   const bool with_load = declared.through_teeth && load_moves(m),
              unknown = declared.through_teeth && m.load.empty();
   const double inertia = declared.motor_inertia + (with_load ? declared.load_inertia : 0);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/record/resampling.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -8,11 +10,13 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
+#include "check_parts.h"
 
 namespace backlash::record {
 namespace {
 
-constexpr double kKept = 0.4;  // choice: of a sampling rate, that a low-pass keeps before it
+constexpr double kWorthwhile = 0.1;  // choice: of the longest part
+constexpr double kKept = 0.4;        // choice: of a sampling rate, that a low-pass keeps before it
 
 EvenGrid on_grid(const EvenGrid& from, double interval) {
   const Record& record = from.record;
@@ -58,6 +62,30 @@ EvenGrid evenly_sampled_grid(const Record& record) {
 
 Record evenly_sampled(const Record& record) {
   return even_rows(record, kGapFactor).record;
+}
+
+std::vector<Record> parts_between_gaps(Record record) {
+  const double longest = kLongestFilled * record.sampling_interval();
+  std::vector<double> starts = {record.size() > 0 ? record.time.front() : 0};
+  double duration = 0;
+  for (std::size_t k = 1; k < record.size(); ++k) {
+    if (record.time[k] - record.time[k - 1] > longest) starts.push_back(record.time[k]);
+    duration = std::max(duration, record.time[k] - starts.back());
+  }
+  if (starts.size() == 1) return {std::move(record)};
+  std::vector<std::string> used;
+  std::vector<Record> parts;
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    Record part = record.slice(starts[i], i + 1 < starts.size() ? starts[i + 1] : INFINITY);
+    if (part.time.back() - part.time.front() < kWorthwhile * duration) continue;
+    used.push_back(fmt::format("{:.6g} to {:.6g} s", part.time.front(), part.time.back()));
+    part.name += fmt::format(" from {:.6g} s", part.time.front());
+    if (!parts.empty()) part.warnings.clear();
+    parts.push_back(std::move(part));
+  }
+  parts.front().warnings.push_back(fmt::format("cut at {} of more than {:.4g} s; used are {}",
+                                               counted(starts.size() - 1, "gap"), longest, joined(used)));
+  return parts;
 }
 
 EvenGrid resampled(const Record& record, double interval) {

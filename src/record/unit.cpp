@@ -28,7 +28,8 @@ constexpr Unit kUnits[] = {
     {"ns", Q::time, kLinear, 1e9, kDivides},
     {"min", Q::time, kLinear, 60, false},
     {"h", Q::time, kLinear, 3600, false},
-    {"hh:mm:ss", Q::time, kAngular, 1, false},  // told from s by `angular`, which means nothing else here
+    {"hh:mm:ss", Q::time, kAngular, 1,
+     false},  // distinguished from s by `angular`, which means nothing else here
     {"rad", Q::position, kAngular, 1, false},
     {"mrad", Q::position, kAngular, 1e3, kDivides},
     {"deg", Q::position, kAngular, kDegree, false},

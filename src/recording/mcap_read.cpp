@@ -92,7 +92,7 @@ class Pass {
     }
   }
 
-  std::string cut;  // what to tell of a file that ends too early
+  std::string cut;  // what is reported of a file that ends too early
   std::vector<Topic> found() const {
     std::vector<Topic> all;
     for (const auto& [id, channel] : channels_) {
@@ -252,7 +252,8 @@ class Pass {
       channel(fields);
     } else if (opcode == kMessage) {
       const auto channel = channels_.find(fields.number<std::uint16_t>());
-      if (channel == channels_.end()) fields.fail("a message on a channel that was not told before");
+      if (channel == channels_.end())
+        fields.fail("a message on a channel that no earlier record of the file declares");
       if (!channel->second.wanted) return;
       fields.bytes(4);  // sequence number
       const auto log_time = fields.number<std::uint64_t>();

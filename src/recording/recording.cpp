@@ -57,7 +57,7 @@ std::vector<fs::path> files_of_metadata(const fs::path& folder) {
   return files;
 }
 
-/// A folder of rosbag2: its files by their times, which neither names nor metadata need tell.
+/// A folder of rosbag2: its files by their times, which neither names nor metadata need state.
 class Folder : public Recording {
  public:
   explicit Folder(const std::string& path) {

@@ -8,6 +8,7 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 
 #include "backlash_diagnosis/base/error.h"
@@ -34,8 +35,7 @@ std::string uri_of(const std::string& path) {
 
 class Sqlite : public Recording {
  public:
-  explicit Sqlite(const std::string& path) : path_(path) {
-    check_size();
+  explicit Sqlite(const std::string& path) : path_(path), damage_(cut_of(path, page_)) {
     const int code =
         sqlite3_open_v2(uri_of(path).c_str(), &database_, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
     if (code != SQLITE_OK) {
@@ -47,6 +47,8 @@ class Sqlite : public Recording {
     sqlite3_db_config(database_, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
     sqlite3_db_config(database_, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
     try {
+      if (damage_.empty()) damage_ = damage_of_pages();
+      if (!damage_.empty()) take_as_it_is();
       check_tables();
     } catch (...) {
       sqlite3_close(database_);
@@ -64,6 +66,7 @@ class Sqlite : public Recording {
   }
 
   void read(const std::vector<std::string>& topics, const Take& take) override {
+    if (!damage_.empty()) return read_to_damage(topics, take);
     std::map<std::int64_t, std::string> wanted;
     std::string ids;
     each_row(kTopics, [&](sqlite3_stmt* row) {
@@ -85,23 +88,104 @@ class Sqlite : public Recording {
              });
   }
 
+  std::vector<std::string> warnings() const override {
+    return warning_.empty() ? std::vector<std::string>() : std::vector<std::string>{warning_};
+  }
+
  private:
-  /// SQLite reads zeros behind the end of a file. Its header has the size of a page in bytes 16 and 17 (1
-  /// means 65536) and their number in bytes 28 to 31 (sqlite.org/fileformat2.html), big endian.
-  void check_size() const {
-    std::ifstream in = open_input(path_);  // its errors name the reason
+  /// A message that is whole, as far as a file without check sums shows.
+  struct Row {
+    std::int64_t time, id;
+    std::string topic;
+    std::size_t size;  // bytes
+  };
+
+  /// What is missing at the end of the file; empty: nothing. SQLite reads zeros there. Its header has the
+  /// size of a page in bytes 16 and 17 (1 means 65536) and their number in bytes 28 to 31
+  /// (sqlite.org/fileformat2.html), big endian.
+  static std::string cut_of(const std::string& path, std::size_t& page) {
+    std::ifstream in = open_input(path);  // its errors name the reason
     std::string head(100, '\0');
     in.read(head.data(), static_cast<std::streamsize>(head.size()));
     if (in.gcount() != 100 || head.compare(0, 15, "SQLite format 3") != 0)
-      throw BadData(path_, "no SQLite file");
+      throw BadData(path, "no SQLite file");
     const auto byte = [&head](std::size_t i) { return std::uint64_t{static_cast<std::uint8_t>(head[i])}; };
-    const std::uint64_t stated = byte(16) << 8 | byte(17), page = stated == 1 ? 65536 : stated;
+    const std::uint64_t stated = byte(16) << 8 | byte(17);
+    page = stated == 1 ? 65536 : stated;
     const std::uint64_t count = byte(28) << 24 | byte(29) << 16 | byte(30) << 8 | byte(31);
     in.seekg(0, std::ios::end);
     const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
     std::error_code error;
-    if (!std::filesystem::exists(path_ + "-wal", error) && size < page * count)
-      throw BadData(path_, fmt::format("the file was cut off: {} bytes of {} are there", size, page * count));
+    if (std::filesystem::exists(path + "-wal", error) || size >= page * count) return "";
+    return fmt::format("the file was cut off: {} bytes of {} are there", size, page * count);
+  }
+
+  std::string damage_of_pages() {
+    std::string problem;
+    try {
+      each_row("PRAGMA quick_check(1)", [&](sqlite3_stmt* row) { problem = text(row, 0); });
+    } catch (const BadData&) {
+      problem = sqlite3_errmsg(database_);
+    }
+    return problem == "ok" ? "" : "damaged: " + printable(problem, 200);
+  }
+
+  /// With a writable schema, of a file that is opened for reading only, SQLite takes the pages that are there
+  /// (sqlite.org/pragma.html#pragma_writable_schema, "corrupt").
+  void take_as_it_is() {
+    sqlite3_db_config(database_, SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
+    each_row("PRAGMA writable_schema=ON", [](sqlite3_stmt*) {});
+    each_row("PRAGMA cell_size_check=ON", [](sqlite3_stmt*) {});
+  }
+
+  /// The messages before the damage, as they stand in the file: without the index of their times, which may
+  /// be damaged too. What no recorder writes is damage, too; and the message before it may be a part of one,
+  /// as nothing has a check sum.
+  std::vector<Row> rows_before_damage(const std::vector<std::string>& topics) {
+    std::map<std::int64_t, std::string> known;
+    each_row(kTopics, [&](sqlite3_stmt* row) { known.emplace(sqlite3_column_int64(row, 0), text(row, 1)); });
+    std::vector<Row> rows;
+    bool whole = true;
+    try {
+      std::int64_t last = std::numeric_limits<std::int64_t>::min();
+      each_row("SELECT topic_id, data, rowid, timestamp FROM messages NOT INDEXED ORDER BY rowid",
+               [&](sqlite3_stmt* row) {
+                 const auto topic = known.find(sqlite3_column_int64(row, 0));
+                 const std::int64_t id = sqlite3_column_int64(row, 2), time = sqlite3_column_int64(row, 3);
+                 if (topic == known.end() || sqlite3_column_type(row, 0) != SQLITE_INTEGER ||
+                     sqlite3_column_type(row, 1) != SQLITE_BLOB || !sqlite3_column_blob(row, 1) ||
+                     sqlite3_column_type(row, 3) != SQLITE_INTEGER || id <= last || time < 0)
+                   fail();
+                 last = id;
+                 rows.push_back({time, id, topic->second, std::size_t(sqlite3_column_bytes(row, 1))});
+               });
+    } catch (const BadData&) {
+      whole = false;
+    }
+    for (std::size_t left_out = 0; !whole && !rows.empty() && left_out < page_; rows.pop_back())
+      left_out += rows.back().size;
+    warning_ = path_ + ": " + damage_ + "; " +
+               (whole ? fmt::format("its {} messages were read", rows.size())
+                      : fmt::format("{} messages were read, nothing behind them", rows.size()));
+    rows.erase(std::remove_if(rows.begin(), rows.end(),
+                              [&](const Row& row) {
+                                return std::find(topics.begin(), topics.end(), row.topic) == topics.end();
+                              }),
+               rows.end());
+    std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
+      return std::make_pair(a.time, a.id) < std::make_pair(b.time, b.id);
+    });
+    return rows;
+  }
+
+  void read_to_damage(const std::vector<std::string>& topics, const Take& take) {
+    for (const Row& wanted : rows_before_damage(topics))
+      each_row(fmt::format("SELECT data FROM messages NOT INDEXED WHERE rowid = {}", wanted.id),
+               [&](sqlite3_stmt* row) {
+                 const auto* data = static_cast<const std::uint8_t*>(sqlite3_column_blob(row, 0));
+                 take({wanted.topic, static_cast<std::uint64_t>(wanted.time), data,
+                       static_cast<std::size_t>(sqlite3_column_bytes(row, 0))});
+               });
   }
 
   /// Views in their place could run anything.
@@ -109,9 +193,6 @@ class Sqlite : public Recording {
     int found = 0;
     each_row("SELECT 1 FROM sqlite_master WHERE type='table' AND name IN ('topics','messages')",
              [&](sqlite3_stmt*) { ++found; });
-    std::string problem;
-    each_row("PRAGMA quick_check(1)", [&](sqlite3_stmt* row) { problem = text(row, 0); });
-    if (problem != "ok") throw BadData(path_, "damaged: " + printable(problem, 200));
     if (found != 2) throw BadData(path_, "no recording of rosbag2: it has no tables 'topics' and 'messages'");
   }
 
@@ -138,6 +219,9 @@ class Sqlite : public Recording {
   }
 
   const std::string path_;
+  std::size_t page_ = 0;  // bytes
+  std::string damage_;    // what is wrong with the file; empty: nothing
+  std::string warning_;   // of the last read
   sqlite3* database_ = nullptr;
 };
 

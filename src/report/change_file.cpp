@@ -75,7 +75,7 @@ std::string change_text(const diagnosis::FoundChange& change) {
   if (change.effect == "unknown")
     text += "; no effect explains it";
   else if (!change.equivalent_to.empty())
-    text += "; not told from " + joined(change.equivalent_to);
+    text += "; not distinguished from " + joined(change.equivalent_to);
   return text;
 }
 

@@ -91,26 +91,26 @@ std::string play_text(const diagnosis::HistoryEntry* e) {
                      four_digits(upper / unit), name);
 }
 
-struct Told {
+struct PlayEstimates {
   const diagnosis::HistoryEntry *first = nullptr, *last = nullptr;
   std::size_t count = 0;
 };
 
-Told told_of(const JointDay& joint) {
-  Told told;
+PlayEstimates play_estimates(const JointDay& joint) {
+  PlayEstimates found;
   for (const diagnosis::HistoryEntry& e : joint.estimates) {
-    if (!tells(e)) continue;
-    if (!told.first) told.first = &e;
-    told.last = &e;
-    ++told.count;
+    if (!has_play(e)) continue;
+    if (!found.first) found.first = &e;
+    found.last = &e;
+    ++found.count;
   }
-  return told;
+  return found;
 }
 
-std::string told_text(const JointDay& joint, const Told& told) {
+std::string count_text(const JointDay& joint, const PlayEstimates& found) {
   if (joint.estimates.empty()) return "none";
-  std::string text = fmt::format("{} of {} told", told.count, joint.estimates.size());
-  if (told.last) text += ", the last " + utc_time(told.last->time);
+  std::string text = fmt::format("{} of {} with a play", found.count, joint.estimates.size());
+  if (found.last) text += ", the last " + utc_time(found.last->time);
   return text;
 }
 
@@ -126,11 +126,11 @@ std::string silence_text(const JointDay& joint, const Day& day) {
 }
 
 Json joint_json(const JointDay& joint, const Day& day) {
-  const Told told = told_of(joint);
+  const PlayEstimates found = play_estimates(joint);
   Json json = {{"joint", joint.joint},
                {"grade", joint.estimates.empty() ? "" : joint.estimates.back().grade},
                {"estimates", joint.estimates.size()},
-               {"told", told.count},
+               {"told", found.count},
                {"silent_since", joint.silent_since ? Json(*joint.silent_since) : Json(nullptr)},
                {"silence", silence_text(joint, day)},
                {"series", Json::array()},
@@ -154,12 +154,12 @@ Json joint_json(const JointDay& joint, const Day& day) {
 }
 
 Json row_of(const JointDay& joint, const Day& day) {
-  const Told told = told_of(joint);
+  const PlayEstimates found = play_estimates(joint);
   Json row = {{"joint", joint.joint},
               {"grade", joint.estimates.empty() ? "" : joint.estimates.back().grade},
-              {"first", play_text(told.first)},
-              {"last", play_text(told.last)},
-              {"told", told_text(joint, told)},
+              {"first", play_text(found.first)},
+              {"last", play_text(found.last)},
+              {"estimates", count_text(joint, found)},
               {"silence", silence_text(joint, day)},
               {"changes", Json::array()}};
   for (const diagnosis::KnownChange& c : joint.changes)
@@ -182,7 +182,7 @@ std::string plots_of(const Day& day) {
 
 }  // namespace
 
-bool tells(const diagnosis::HistoryEntry& e) {
+bool has_play(const diagnosis::HistoryEntry& e) {
   return std::isfinite(e.backlash) || std::isfinite(e.upper) || std::isfinite(e.backlash_angle) ||
          std::isfinite(e.angle_upper);
 }
@@ -212,14 +212,14 @@ std::string day_summary(const Day& day) {
   std::vector<std::string> changes;
   std::size_t mute = 0;
   for (const JointDay& joint : day.joints) {
-    mute += told_of(joint).count == 0;
+    mute += play_estimates(joint).count == 0;
     for (const diagnosis::KnownChange& c : joint.changes)
       changes.push_back(joint.joint + ": " + change_text(c.found));
   }
   std::string text = fmt::format("{} to {}: {} {}, ", utc_time(day.from), utc_time(day.to), day.joints.size(),
                                  day.joints.size() == 1 ? "joint" : "joints");
-  text += changes.empty() ? "no change was told" : "changed: " + joined(changes);
-  if (mute > 0) text += fmt::format("; of {} no estimate told the play", mute);
+  text += changes.empty() ? "no change was reported" : "changed: " + joined(changes);
+  if (mute > 0) text += fmt::format("; of {} no estimate states the play", mute);
   for (const JointDay& joint : day.joints)
     if (joint.silent_since) text += "; " + joint.joint + ": " + silence_text(joint, day);
   return text;

@@ -19,7 +19,7 @@ namespace backlash::report {
 namespace {
 
 constexpr double kMicrometre = 1e-6, kMilliradian = 1e-3;
-constexpr double kTold = 0.9;  // of what was known before, from which a record tells nothing: choice
+constexpr double kMostLeft = 0.9;  // of the spread known before, above which a record adds nothing: choice
 
 /// "80.0" and "[78.2, 81.9]"; an end that is not known is "?". Both empty where nothing is known.
 Json cell(double value, double lower, double upper, double unit) {
@@ -78,7 +78,7 @@ std::string headline(const diagnosis::Verdict& v, const PageUnit& unit) {
                      four_digits(upper / unit.scale()), fmt::arg("unit", unit.name()));
 }
 
-/// What a headline leaves to be said: by which methods, and what contradicts them.
+/// What the headline does not say: by which methods, and what contradicts them.
 std::string beside_headline(const std::string& message) {
   const std::size_t by = message.find(" by ");
   return by == std::string::npos ? message : "B" + message.substr(by + 2);
@@ -142,11 +142,11 @@ std::string found_text(const rig_file::DeclaredValue& v, const diagnosis::Wavefo
   const auto place = static_cast<std::size_t>(v.quantity);
   const diagnosis::WaveformEvidence::Value& e = evidence->values[place];
   const double before = e.spread * (diagnosis::waveform_quantities()[place].factor ? e.found : 1);
-  if (!(e.standard_error < kTold * before)) return "tells nothing of it";
+  if (!(e.standard_error < kMostLeft * before)) return "not determined by it";
   return fmt::format("{} \u00b1 {:.1g}", four_digits(e.found - v.share), e.standard_error);
 }
 
-/// The machine as its rig file declares it, and beside it as a fit found it that is believed.
+/// The machine as its rig file declares it, and beside it as a trusted fit found it.
 Json machine(const DiagnosisReport& report, const rig_file::RigFile* rig) {
   Json rows = Json::array();
   if (!rig) return rows;

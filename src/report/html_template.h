@@ -4,9 +4,8 @@
 //
 //   {{name}}                   the text, with the characters that HTML takes for its own replaced
 //   {{{name}}}                 the text as it is: it is HTML already
-//   {{#name}} ... {{/name}}    once for each item of a list, once for another value; not for an empty text or
-//   list,
-//                              null, false or a name that the data does not have
+//   {{#name}} ... {{/name}}    once for each item of a list, once for another value; not for null, false, an
+//                              empty text or list, or a name that the data does not have
 //   {{^name}} ... {{/name}}    once where the other would not be there
 //
 // Names are looked up in the item of the innermost section first. A tag of a section may end a line, which is

@@ -3,7 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/model/axis_unit.h"
 #include "json.h"
 
 namespace backlash::report {
@@ -62,6 +66,52 @@ std::string describe(const std::string& name, const record::ChannelState& state)
   return fmt::format("{}: {:.4g} Hz, {:.4g} to {:.4g} {}, steps of {:.3g}, noise {:.2g}{}\n", name,
                      state.rate, state.low, state.high, record::channel_unit(state.channel), state.resolution,
                      state.noise, state.held > 0 ? fmt::format(", {:.3g} % held", 100 * state.held) : "");
+}
+
+constexpr std::size_t kGroups = 4000;  // choice: several for each pixel of a screen
+
+/// Samples through which a line looks like one through all of them: of each group of neighbours the lowest
+/// and the highest, and one without a number where there is one.
+std::vector<std::size_t> drawn_samples(const std::vector<double>& x) {
+  const std::size_t group = std::max<std::size_t>(1, x.size() / kGroups);
+  std::vector<std::size_t> drawn;
+  for (std::size_t begin = 0; begin < x.size(); begin += group) {
+    const std::size_t end = std::min(begin + group, x.size());
+    std::size_t low = begin, high = begin, gap = end;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!std::isfinite(x[i])) gap = i;
+      if (!(x[low] <= x[i])) low = i;
+      if (!(x[high] >= x[i])) high = i;
+    }
+    std::vector<std::size_t> kept = {low, high};
+    if (gap < end) kept.push_back(gap);
+    std::sort(kept.begin(), kept.end());
+    drawn.insert(drawn.end(), kept.begin(), std::unique(kept.begin(), kept.end()));
+  }
+  return drawn;
+}
+
+Json drawn(const std::vector<double>& t, const std::vector<double>& x, record::Channel channel, bool linear) {
+  Json time = Json::array(), values = Json::array();
+  for (const std::size_t i : drawn_samples(x)) {
+    time.push_back(t[i]);
+    values.push_back(json_number(x[i]));
+  }
+  return {
+      {"unit", model::axis_unit(record::channel_unit(channel), linear)}, {"time", time}, {"values", values}};
+}
+
+Json series_of(const record::Record& record, bool linear) {
+  Json channels = Json::object();
+  for (const record::Channel channel : record::kChannels)
+    if (record.has(channel))
+      channels[record::channel_name(channel)] = drawn(record.time, record.column(channel), channel, linear);
+  const record::Channel motor = record::Channel::motor_position, load = record::Channel::load_position;
+  if (!record.has(motor) || !record.has(load)) return channels;
+  std::vector<double> difference = record.column(motor);
+  for (std::size_t i = 0; i < difference.size(); ++i) difference[i] -= record.column(load)[i];
+  channels["motor - load"] = drawn(record.time, difference, motor, linear);
+  return channels;
 }
 
 }  // namespace
@@ -126,6 +176,15 @@ std::string record_check_text(const CheckedFile& file, const std::vector<Serves>
     text += fmt::format("  {}: {}{}\n", each.name, each.ok ? "yes" : "no",
                         each.reason.empty() ? "" : ", " + each.reason);
   return text;
+}
+
+std::string record_check_series(const CheckedFile& file, const std::vector<record::JointRecord>& recorded,
+                                bool linear) {
+  Json joints = Json::array();
+  for (const record::JointRecord& joint : recorded)
+    joints.push_back({{"name", joint.joint}, {"channels", series_of(joint.record, linear)}});
+  return dumped(
+      {{"schema_version", 1}, {"joints", joints}, {"report", Json::parse(record_check_json(file, {}))}}, -1);
 }
 
 std::string with_record_check(const std::string& json, const std::vector<CheckedFile>& files) {

@@ -76,7 +76,7 @@ std::string part_of_order(const Drive& drive, double order, double standard_erro
     if (m > 1) to += fmt::format(" (multiple {})", m);
   }
   if (is.empty() && is_not.empty()) return "";
-  if (is.empty()) is = "no part of the drive that the rig file tells";
+  if (is.empty()) is = "no part of the drive that the rig file states";
   return is_not.empty() ? is
                         : fmt::format("{}; not, nor up to {} times as often: {}", is, kMultiples, is_not);
 }

@@ -12,7 +12,7 @@
 namespace backlash::rig_file {
 namespace {
 
-constexpr double kClear = 4;  // choice: standard errors, from which a value is told apart from zero
+constexpr double kClear = 4;  // choice: standard errors, from which a value differs clearly from zero
 
 /// "kg m^2, fitted +- 0.02", of a value that the file has divided by `divisor`; "held" without an error.
 std::string fitted_comment(const FittedValues& found, const std::string& name, double divisor) {
@@ -21,7 +21,7 @@ std::string fitted_comment(const FittedValues& found, const std::string& name, d
   return fmt::format("{}, fitted +- {:.2g}", found.units.at(name), error / divisor);
 }
 
-/// A skew that is not told apart from zero makes no new line in a file.
+/// A skew that does not differ clearly from zero makes no new line in a file.
 bool is_worth_writing(const FittedValues& found, const YamlTree& tree) {
   const RigParameter& skew = servo_parameter(RigPart::sensors, ParameterKind::encoder_skew);
   const signal::Measured& m = found.parameters.at(skew.name);

@@ -160,7 +160,8 @@ std::string commissioned_text(const RigFile& file, const diagnosis::WaveformComm
   }
   const diagnosis::WaveformCommissioning::State& first = found.states.front();
   set_backlash_of(document, file, first.backlash, first.log_error, source);
-  document.set_section("commissioned", section, "what the records told beyond the keys above: " + source);
+  document.set_section("commissioned", section,
+                       "what the records determine beyond the keys above: " + source);
   document.read();  // what is written can be read
   return document.text();
 }

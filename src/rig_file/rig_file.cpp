@@ -56,7 +56,7 @@ bool fill_contact(const model::Mesh& mesh, diagnosis::WaveformSettings& s) {
   return true;
 }
 
-/// Of a rig that the estimator's equations describe; nothing of any other.
+/// For a rig that the estimator's equations describe; nothing for any other.
 std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   const model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
   if (in.rigid || (out.rigid && rig.link_locked) || rig.mesh.rigid || rig.mesh.variation || rig.mesh.pairs ||
@@ -82,7 +82,7 @@ std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   return s;
 }
 
-/// The same. Its values at the axis of motor_position.
+/// The same, with its values at the axis of motor_position.
 std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
     const model::Rig& rig, const std::shared_ptr<const model::GearTrain>& train) {
   if (rig.link_locked || !rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.linear ||
@@ -274,7 +274,7 @@ bool is_urdf(const std::string& path) {
 bool is_arm_rig(const std::string& path) {
   if (is_urdf(path))
     throw BadData(path,
-                  "is a URDF: what is needed is a rig file, which names it and tells the drives; "
+                  "is a URDF: what is needed is a rig file, which names it and describes the drives; "
                   "plan_motion writes one (--write-rig) to begin with");
   return YamlReader::from_file(path).has("urdf");
 }

@@ -26,7 +26,7 @@ double contact_value(const model::Rig& rig, const char* name) {
   [](const model::Rig& rig) { return contact_value(rig, name); }, \
       [](model::Rig& rig, double value) { set_contact(rig, name, value); }
 
-/// Of one part, in this order: unlike a body's, the parameters of a mesh are no affair of the reduction.
+/// Of one part, in this order: unlike a body's, the parameters of a mesh do not change with the reduction.
 std::vector<RigParameter> inertias_and_mesh() {
   return {
       {"motor_inertia", RigPart::motor, Kind::inertia, "kg m^2", "gear_train.motor.inertia",
@@ -106,7 +106,7 @@ const RigParameter& servo_parameter(RigPart part, ParameterKind kind) {
   throw InvalidParameter("parameter", "of this part and kind", "is not one of a servo with two inertias");
 }
 
-bool told_by_deflection(const RigParameter& p) {
+bool shown_by_deflection(const RigParameter& p) {
   const bool dry = p.part == RigPart::motor && p.kind == Kind::coulomb_friction && !p.is_asymmetry();
   return p.kind == Kind::encoder_skew || p.kind == Kind::stiffness || dry;
 }

@@ -50,7 +50,7 @@ bool take_fields(std::string_view header, const Take& take) {
   return header.empty();
 }
 
-/// What kind of record a value of the field "op" tells; -1 where it is none.
+/// What kind of record a value of the field "op" means; -1 where it is none.
 inline int operation_of(std::string_view value) {
   return value.size() == 1 ? value[0] : -1;
 }

@@ -100,7 +100,7 @@ class IndexReader {
     Fields described;
     if (!described.parse(data_)) fail("a connection record does not hold together");
     for (const std::string_view needed : {fields_.at("topic"), described.at("type"), described.at("md5sum")})
-      if (needed.empty()) fail("a connection record does not tell its topic or type");
+      if (needed.empty()) fail("a connection record does not name its topic or type");
     return {number<std::uint32_t>("conn"), std::string(fields_.at("topic")),
             std::string(described.at("type")), std::string(described.at("md5sum"))};
   }

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -68,19 +67,25 @@ class JointRun {
   void take(const JointStateReader& reader, std::size_t place, const ros::Time& stamp, std::size_t index) {
     if (!reader.problem(place).empty()) fail_at(index, reader.problem(place));
     if (!accept_stamp(stamp, index)) return;
-    if (record_.time.size() == 1) start(reader.values(place));
-    for (std::size_t i = 0; i < record::kChannelCount; ++i) {
-      const double value = reader.values(place)[i];
-      if (std::isnan(value) == present_[i]) fail_as_unlike_before(record::kChannels[i], value, stamp, index);
-      if (present_[i]) record_.column(record::kChannels[i]).push_back(value);
+    if (record_.time.size() == 1) record_.time.reserve(expected_);
+    for (const record::Channel channel : record::kChannels) {
+      std::vector<double>& column = record_.column(channel);
+      const double value = reader.values(place)[static_cast<std::size_t>(channel)];
+      if (column.empty() && std::isnan(value)) continue;  // absent until it turns up
+      if (column.empty()) {
+        column.reserve(expected_);
+        column.resize(record_.size() - 1, std::numeric_limits<double>::quiet_NaN());
+      }
+      column.push_back(value);
     }
   }
 
   record::Record finished() {
     if (record_.time.empty())
       throw BadData(path_, "no message of joint '" + printable(joint_) + "' on " + printable(topic_));
-    require_a_channel();
-    return with_warnings();
+    record::Record record = with_warnings();
+    require_a_channel(record);
+    return record;
   }
 
   /// Of a channel map: what this topic has of it.
@@ -131,27 +136,11 @@ class JointRun {
     return true;
   }
 
-  /// A channel is there in all messages or in none.
-  void start(const record::ChannelValues& first) {
-    record_.time.reserve(expected_);
-    for (std::size_t i = 0; i < record::kChannelCount; ++i) {
-      present_[i] = !std::isnan(first[i]);
-      if (present_[i]) record_.column(record::kChannels[i]).reserve(expected_);
-    }
-  }
-
-  [[noreturn]] void fail_as_unlike_before(record::Channel channel, double value, const ros::Time& stamp,
-                                          std::size_t index) const {
-    fail_at(index, record::channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " +
-                       stamp_text(stamp) + " s is " + (std::isnan(value) ? "missing or NaN" : "there") +
-                       ", unlike in the messages before");
-  }
-
-  void require_a_channel() const {
+  void require_a_channel(const record::Record& record) const {
     std::vector<std::string> present;
     for (const record::Channel channel : record::kChannels)
-      if (record_.has(channel)) present.push_back(record::channel_name(channel));
-    if (!record_.can_show_backlash())
+      if (record.has(channel)) present.push_back(record::channel_name(channel));
+    if (!record.can_show_backlash())
       throw BadData(path_,
                     "joint '" + printable(joint_) + "' on " + printable(topic_) +
                         " has no torque, position, speed of the motor, current or acceleration; it has: " +
@@ -164,7 +153,6 @@ class JointRun {
   ros::Time last_stamp_;
   StampClock clock_, since_first_;
   record::StampChecker stamps_;
-  std::array<bool, record::kChannelCount> present_{};
   record::Record record_;
 };
 
@@ -207,7 +195,7 @@ class Reader {
   }
 
  private:
-  /// What is damaged is told before what is missing, which may be missing for that.
+  /// Damage is reported before what is missing: it may be the cause.
   template <typename Read>
   record::Record of_sound_file(const Read& read) {
     try {
@@ -233,7 +221,7 @@ class Reader {
     for (std::size_t i = 0; i < topics.size(); ++i) meet(map.on(map.topics()[i]), topics[i]);
     mapped_ = true;
     read_messages(topics);
-    return told(joined_parts(map, topics));
+    return with_warnings(joined_parts(map, topics));
   }
 
   /// By the names of this package.
@@ -247,7 +235,7 @@ class Reader {
   record::Record finished(const std::vector<std::string>& topics) {
     JointRun& run = chosen(topics);
     if (run.wrong) std::rethrow_exception(run.wrong);
-    return told(run.finished());
+    return with_warnings(run.finished());
   }
 
   bool any_has(const std::string& name) const {
@@ -255,7 +243,7 @@ class Reader {
                        [&name](const auto& topic) { return topic.second.names.count(name) > 0; });
   }
 
-  record::Record told(record::Record record) const {
+  record::Record with_warnings(record::Record record) const {
     for (std::string& warning : source_->warnings()) record.warnings.push_back(std::move(warning));
     return record;
   }

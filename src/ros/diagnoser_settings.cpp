@@ -6,7 +6,7 @@
 
 namespace backlash::ros_bridge {
 const char* diagnoser_help() {
-  return R"(diagnoser: tells the backlash of geared joints from joint torque and position
+  return R"(diagnoser: estimates the backlash of geared joints from joint torque and position
 
 usage: rosrun backlash_diagnosis diagnoser [_PARAMETER:=VALUE ...] [NAME:=REMAPPED ...]
 

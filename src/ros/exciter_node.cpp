@@ -89,7 +89,7 @@ int ExciterNode::run() {
     const std::string other = other_publisher();
     if (!other.empty()) stop(other + " publishes on " + command_.getTopic() + " too");
   }
-  const std::string why = missed >= kMissed ? "the ROS master is gone" : "the node was told to end";
+  const std::string why = missed >= kMissed ? "the ROS master is gone" : "the node was asked to end";
   ROS_WARN_STREAM(why);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -97,7 +97,7 @@ int ExciterNode::run() {
   }
   stop(why);
   server_->shutdown();  // waits for the thread that commands: zeros are out, the bag is written
-  std::this_thread::sleep_for(kLook);  // for the result; roscpp cannot tell when it is out
+  std::this_thread::sleep_for(kLook);  // for the result; roscpp does not report when it is out
   return missed >= kMissed ? kMasterLost : 0;
 }
 
@@ -174,7 +174,7 @@ void ExciterNode::command_until_the_end(Result& result) {
     double torque = 0, fraction = 0;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (signalled != 0 || !ros::ok()) drive_->stop("the node was told to end");
+      if (signalled != 0 || !ros::ok()) drive_->stop("the node was asked to end");
       if (server_->isPreemptRequested()) drive_->stop("cancelled");
       torque = drive_->torque(now);
       fraction = drive_->fraction(now);

@@ -23,7 +23,7 @@ Private parameters; unknown ones are refused. Those without a default must be gi
   state_age       0.1 s, a run stops where no state has come for longer
   still           2 s, a run stops where nothing moved for so long at half of its largest torque or more
   rate            200 Hz, of the commands
-  dry_run         false; true: goals are checked and told, nothing is commanded; a goal's
+  dry_run         false; true: goals are checked and reported, nothing is commanded; a goal's
                   bag then holds the plan (plot_excitation.py draws both)
   folder          folder of the bags; without it no goal may ask for one
 
@@ -39,7 +39,7 @@ Action
 A goal is refused where another node publishes torque_command or none listens. A run stops in zero torque: cancel, SIGINT,
 SIGTERM, loss of the ROS master, old or wrong states, a limit, a joint that moves against the torque, one that does not
 move. Zero torque is no brake: a joint that carries a load needs another way to hold it.
-Exit code 0 when told to end, 64 for a wrong parameter, 65 for a wrong rig file, 66 for a missing one, 70 where the
+Exit code 0 when asked to end, 64 for a wrong parameter, 65 for a wrong rig file, 66 for a missing one, 70 where the
 master was lost.
 )";
 }

@@ -188,7 +188,7 @@ class Child {
   std::optional<int> status_;
 };
 
-/// What a job has told last.
+/// What a job has reported last.
 struct JobProgress {
   double fraction = 0;
   std::string phase = "starting", best;
@@ -209,13 +209,13 @@ struct JobProgress {
 void run_job(const Job& job) {
   if (!(job.memory > 0)) throw InvalidParameter("memory", job.memory, "must be > 0 GB");
   Child child(job);
-  JobProgress told;
+  JobProgress reported;
   for (bool running = true; running;) {
     running = child.wait();
-    const std::string before = told.best;
-    while (const auto line = child.line()) told.read(*line);
-    if (job.best_so_far && told.best != before) job.best_so_far(told.best);
-    if (running && job.progress && !job.progress(told.fraction, told.phase)) {
+    const std::string before = reported.best;
+    while (const auto line = child.line()) reported.read(*line);
+    if (job.best_so_far && reported.best != before) job.best_so_far(reported.best);
+    if (running && job.progress && !job.progress(reported.fraction, reported.phase)) {
       child.cancel();
       throw Cancelled();
     }

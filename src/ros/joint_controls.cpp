@@ -54,7 +54,7 @@ void JointControls::age_torque() {
   if (torque_samples_ > 0 && torque_age_++ == torque_samples_) joint_.set_torque(0);
 }
 
-void JointControls::tell() {
+void JointControls::publish() {
   publish_true_backlash();
   live_->update(live());
 }

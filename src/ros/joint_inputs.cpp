@@ -10,7 +10,7 @@
 namespace backlash::ros_bridge {
 namespace {
 
-constexpr std::size_t kMostNames = 200;  // choice: of a topic, that are told
+constexpr std::size_t kMostNames = 200;  // choice: of a topic, that are listed
 constexpr long kFirstLook = 20;  // choice: messages, before a name that has not come is missed: a robot may
                                  // publish its parts in turn
 

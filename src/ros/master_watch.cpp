@@ -47,14 +47,14 @@ const std::string& own_uri() {
   return ros::XMLRPCManager::instance()->getServerURI();
 }
 
-/// The master tells the subscribers.
+/// The master informs the subscribers.
 bool publish_again(const std::string& topic) {
   XmlRpcValue subscribers;
   const ros::PublicationPtr publication = ros::TopicManager::instance()->lookupPublication(topic);
   return publication && ask("registerPublisher", {topic, publication->getDataType(), own_uri()}, subscribers);
 }
 
-/// Publishers that the master knows already are told to this node as the master itself would do it later.
+/// Publishers that the master knows already are reported to this node as the master itself would later.
 bool subscribe_again(const std::string& topic) {
   XmlRpcValue publishers;
   if (!ask("registerSubscriber", {topic, "*", own_uri()}, publishers)) return false;
@@ -134,7 +134,7 @@ void MasterWatch::look() {
   if (complete_)
     ROS_WARN("the ROS master did not know this node any more (it was started again): registered again");
   else
-    ROS_ERROR("the ROS master does not know this node any more and refuses a part of what it is told");
+    ROS_ERROR("the ROS master does not know this node any more and refuses a part of the registrations");
 }
 
 }  // namespace backlash::ros_bridge

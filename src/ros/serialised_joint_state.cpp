@@ -36,7 +36,7 @@ bool JointStateDecoder::decode(std::string_view bytes) {
 }
 
 bool JointStateDecoder::take_names(std::string_view& bytes) {
-  // Names tell themselves how long they are: the same bytes are the same names, whatever follows.
+  // Names carry their own length: the same bytes are the same names, whatever follows.
   if (!names_.empty() && bytes.substr(0, names_.size()) == names_) {
     bytes.remove_prefix(names_.size());
     return true;

@@ -56,7 +56,7 @@ void SimulatedJoint::step(std::map<std::string, sensor_msgs::JointState>& messag
 
 void SimulatedJoint::reset() {
   simulation_.reset();
-  controls_.tell();
+  controls_.publish();
 }
 
 bool SimulatedJoint::set_rig(backlash_diagnosis::SetRig::Request& request,
@@ -64,7 +64,7 @@ bool SimulatedJoint::set_rig(backlash_diagnosis::SetRig::Request& request,
   try {
     const rig_file::RigFile file = rig_file::rig_file_from_text(request.rig, "set_rig");
     simulation_.plant().set_machine(file.rig);
-    controls_.tell();
+    controls_.publish();
     response.success = true;
     response.message = "the machine is " + file.rig.name + " of digest " + file.digest;
     ROS_INFO_STREAM(name_ << ": " << response.message);

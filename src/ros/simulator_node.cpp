@@ -28,7 +28,7 @@ constexpr nanoseconds kIdle = 20ms;  // longest sleep, so that Ctrl-C ends fast
 constexpr nanoseconds kPoll = 1ms;   // of an external /clock
 constexpr nanoseconds kTolerableLag = 100ms;
 constexpr nanoseconds kWarningInterval = 5s;
-constexpr nanoseconds kLinger = 500ms;  // for the last messages; roscpp cannot tell when they are out
+constexpr nanoseconds kLinger = 500ms;  // for the last messages; roscpp does not report when they are out
 
 double seconds(nanoseconds t) {
   return std::chrono::duration<double>(t).count();

@@ -66,7 +66,7 @@ double white_variance(const std::vector<double>& power, double from, double to) 
 }
 
 /// From third differences, the largest tenth left out: what moves smoothly, and the few samples where a
-/// signal jumps, cancel. A jump is white, so its spectrum does not tell it from noise.
+/// signal jumps, cancel. A jump is white, so its spectrum looks like that of noise.
 double variance_between_jumps(const std::vector<double>& x) {
   std::vector<double> square = differences(x, 3);
   for (double& d : square) d *= d;

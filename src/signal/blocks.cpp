@@ -78,7 +78,7 @@ Eigen::MatrixXd jackknife_changes(const Eigen::MatrixXd& a, const Eigen::VectorX
     const Eigen::MatrixXd rest = all - normal[b];
     if (!(smallest_pivot(rest) > kSmallestPivot))
       throw CannotIdentify(
-          "one part of the data decides alone: the unknowns cannot be told apart without it");
+          "one part of the data decides alone: without it the unknowns cannot be distinguished");
     changes.col(b) = -solve_symmetric(rest, gradient[b]).cwiseProduct(unit);
   }
   const Eigen::VectorXd mean = changes.rowwise().mean();

@@ -35,7 +35,7 @@ LeastSquaresFit solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const 
   const Eigen::MatrixXd scaled = weighted * unit.asDiagonal();
   const QrSolution solution = solve_least_squares(scaled, root.cwiseProduct(b));
   if (!(solution.diagonal_ratio > 1 / kWorstCondition))
-    throw CannotIdentify("the equations cannot tell the unknowns apart");
+    throw CannotIdentify("the equations do not determine the unknowns separately");
   LeastSquaresFit fit;
   fit.values = unit.cwiseProduct(solution.x);
   fit.residuals = b - a * fit.values;
@@ -118,7 +118,7 @@ Eigen::VectorXd beside(Eigen::VectorXd p, Eigen::Index i, double step) {
 /// Steps of each column that it begins with.
 using Steps = std::vector<Eigen::VectorXd>;
 
-/// As many columns in turn as `ahead` can be told of.
+/// As many columns at a time as are announced to `ahead`.
 void for_each_column(const Eigen::VectorXd& p, const Steps& steps, bool parallel, const AheadFunction& ahead,
                      const std::function<void(int)>& column) {
   const int n = int(p.size()), at_once = kPointsAtOnce / int(steps.size());
@@ -268,8 +268,8 @@ Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block,
   }
   if (blocks <= double(n))
     throw CannotIdentify(std::to_string(long(blocks)) +
-                         " stretches of the record cannot tell the errors of " + std::to_string(n) +
-                         " parameters");
+                         " stretches of the record are too few for the standard errors of " +
+                         std::to_string(n) + " parameters");
   outer += gram(scaled.bottomRows(known));
   return unit.asDiagonal() * product(product(inverse, outer), inverse) * unit.asDiagonal();
 }

@@ -128,7 +128,7 @@ struct Integrator::Impl {
   void refuse_unreachable(double t) const;
   void require_finite() const;
   IntegratorStatistics since_restart() const;
-  /// Negative return codes are errors; positive ones tell why the solver returned.
+  /// Negative return codes are errors; positive ones say why the solver returned.
   void check(int code, const char* function) const;
   [[noreturn]] void fail(const std::string& what) const;
 

@@ -104,7 +104,7 @@ Cell make_cell(const CurvePlan& plan, double backlash, const FineRun& run) {
   return cell;
 }
 
-/// What lies in the middle between two points, to learn how well the curve and its family hold there.
+/// Runs in the middle between two points, to learn how well curve and family hold there.
 struct Middle {
   std::vector<double> backlash;
   std::vector<std::vector<diagnosis::SkewnessCell>> cells;
@@ -156,7 +156,7 @@ void take(const CurvePlan& plan, std::size_t i, double backlash, FineRun run, Ce
   }
 }
 
-/// Tells what of the curve is there.
+/// Reports which points of the curve are there.
 class PointsDone {
  public:
   explicit PointsDone(const CurveRequest& request) : request_(request) {}
@@ -201,22 +201,22 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   return all;
 }
 
-/// Share of the runs between the points whose interval holds their own backlash, of those that get one.
+/// Of the runs between the points that get an interval: the share whose interval contains their backlash.
 double coverage(const diagnosis::MonitoringCurve& curve, const Middle& middle) {
-  int told = 0, held = 0;
+  int answered = 0, held = 0;
   for (std::size_t i = 0; i < middle.means.size(); ++i)
     for (std::size_t level = 0; level < middle.means[i].size(); ++level)
       for (const double mean : middle.means[i][level]) {
         const diagnosis::Estimate e = curve.invert(mean, curve.conditions.periods, curve.noise_levels[level]);
         if (e.status != diagnosis::Status::ok) continue;
-        ++told;
+        ++answered;
         held += e.lower <= middle.backlash[i] && middle.backlash[i] <= e.upper;
       }
-  return told > 0 ? static_cast<double>(held) / told : 1;
+  return answered > 0 ? static_cast<double>(held) / answered : 1;
 }
 
-/// The smallest factor with which 95 % of the intervals hold, not below that of a normal distribution: the
-/// same runs also set the scatter.
+/// The smallest factor with which 95 % of the intervals contain the truth, not below that of a normal
+/// distribution: the same runs also set the scatter.
 double calibrated_factor(diagnosis::MonitoringCurve curve, const Middle& middle) {
   for (; curve.coverage_factor < 5; curve.coverage_factor += 0.1)
     if (coverage(curve, middle) >= 0.95) break;

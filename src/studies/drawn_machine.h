@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A machine as its rig file describes it, but for what the file does not know exactly.
+// A machine as its rig file describes it, with values drawn within what the file knows of them.
 #pragma once
 
 #include <cstdint>

@@ -27,8 +27,8 @@ record::Record recorded(const record::Record& fine, const rig_file::RigFile& fil
 /// Both, of a machine drawn by d.seed (draw_machine).
 record::Record simulate_draw(const rig_file::RigFile& file, const Draw& d);
 
-/// The verdict as one more estimate, "combined"; where its members contradict each other nobody should rely
-/// on it.
+/// The verdict as one more estimate, "combined"; `ambiguous` where its members contradict each other, for
+/// nobody should rely on it.
 diagnosis::Estimate estimate_of_verdict(const diagnosis::Verdict& verdict);
 
 }  // namespace backlash::studies

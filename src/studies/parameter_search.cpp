@@ -306,7 +306,7 @@ SearchResult search_parameters(const SearchFile& search, const Progress& progres
   const MinimiseResult found = minimise(objective, dimensions, search.minimise, progress);
   SearchResult result;
   rig_file::RigDocument best = rig_with(search, found.x);
-  best.drop_head();  // it tells of the rig that the search began with
+  best.drop_head();  // it describes the rig that the search began with
   set_layout(best, judged(found.x).layout);
   result.rig_text = best.text();
   result.values = values_at(search, found.x);

@@ -50,7 +50,7 @@ record::Record simulate_disturbed(DisturbedMachine machine, double amplitude, do
   const double rate = machine.file.simulation.sensors.sampling_rate;
   const double load = machine.load * amplitude;
   machine.file.simulation.excitation.bias += load;
-  // Nothing is unknown but the disturbance.
+  // Only the disturbance is unknown.
   record::Record fine =
       simulate_fine(machine.file, {machine.file.rig, {machine.sensor_gain, machine.sensor_delay, 0}},
                     backlash, (apd.settling_periods + periods + 1) * apd.period + 2 / rate);

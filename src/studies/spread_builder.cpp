@@ -72,8 +72,8 @@ Trial try_out(const CurvePlan& plan, const diagnosis::MonitoringCurve& curve, do
   return trial;
 }
 
-/// Each drawn machine at backlash values spread over the curve and beyond, other values each; denser where it
-/// is small, as a lower bound above the truth is told by those alone.
+/// Each drawn machine at backlash values of its own, spread over the curve and beyond; denser where backlash
+/// is small, as those alone show a lower bound above the truth.
 std::vector<Machine> machines_of(const CurvePlan& plan) {
   std::vector<Machine> machines;
   for (int m = 0; m < plan.request.machines; ++m) {
@@ -85,7 +85,7 @@ std::vector<Machine> machines_of(const CurvePlan& plan) {
       machines.push_back(with_backlash(machine, kReach * plan.request.max_backlash * place));
     }
   }
-  // What sticks cannot be moved together with others.
+  // Machines that stick cannot be moved together with others.
   std::stable_partition(machines.begin(), machines.end(),
                         [](const Machine& m) { return m.rig.motor.coulomb_friction == 0; });
   return machines;
@@ -112,22 +112,23 @@ std::vector<Trial> run_trials(const CurvePlan& plan, const diagnosis::Monitoring
   return trials;
 }
 
-/// How far answers near a backlash are off: of all within `near`, and of the kFewest nearest; `all` that was
+/// How far answers near a backlash are off: all within `near`, and the kFewest nearest; `all` that were
 /// drawn where there are too few.
-void add_point(std::vector<const Trial*> told, diagnosis::Estimate Trial::*method, double backlash,
+void add_point(std::vector<const Trial*> answered, diagnosis::Estimate Trial::*method, double backlash,
                double near, double all, DeclaredSpread::Widening& w) {
   const auto distance = [&](const Trial* t) { return std::fabs((t->*method).backlash - backlash); };
-  if (told.size() < DeclaredSpread::kFewest) {
+  if (answered.size() < DeclaredSpread::kFewest) {
     w.below.push_back(all);
     w.above.push_back(all);
     return;
   }
-  std::sort(told.begin(), told.end(),
+  std::sort(answered.begin(), answered.end(),
             [&](const Trial* a, const Trial* b) { return distance(a) < distance(b); });
   double below = 0, above = 0;
-  for (std::size_t i = 0; i < told.size() && (i < DeclaredSpread::kFewest || distance(told[i]) < near); ++i) {
-    below = std::max(below, (told[i]->*method).lower - told[i]->truth);
-    above = std::max(above, told[i]->truth - (told[i]->*method).upper);
+  for (std::size_t i = 0;
+       i < answered.size() && (i < DeclaredSpread::kFewest || distance(answered[i]) < near); ++i) {
+    below = std::max(below, (answered[i]->*method).lower - answered[i]->truth);
+    above = std::max(above, answered[i]->truth - (answered[i]->*method).upper);
   }
   w.below.push_back(below);
   w.above.push_back(above);
@@ -137,15 +138,15 @@ DeclaredSpread::Widening widening(const std::vector<Trial>& trials, diagnosis::E
                                   const diagnosis::MonitoringCurve& curve) {
   DeclaredSpread::Widening w;
   w.bound = 0;
-  std::vector<const Trial*> told;
+  std::vector<const Trial*> answered;
   for (const Trial& trial : trials) {
     const diagnosis::Estimate& e = trial.*method;
-    if (e.status == diagnosis::Status::ok) told.push_back(&trial);
+    if (e.status == diagnosis::Status::ok) answered.push_back(&trial);
     if (e.status == diagnosis::Status::above_range) w.bound = std::fmax(w.bound, e.lower - trial.truth);
   }
   for (const diagnosis::CurvePoint& point : curve.points)
-    add_point(told, method, point.backlash, kNear * length_of(curve), kReach * curve.points.back().backlash,
-              w);
+    add_point(answered, method, point.backlash, kNear * length_of(curve),
+              kReach * curve.points.back().backlash, w);
   return w;
 }
 

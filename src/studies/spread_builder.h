@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What machines that the rig file allows teach a curve.
+// Widens the intervals of a curve by machines that the rig file allows.
 #pragma once
 
 #include "fine_run.h"

@@ -15,9 +15,9 @@ namespace backlash::studies {
 namespace {
 
 // What makes a miss one that was wrong and sure. Choices.
-constexpr double kWidths = 2;        // of the interval, outside of it
-constexpr double kFar = 10e-6;       // m (angular mesh: rad), outside of it, and
-constexpr double kFarOfTruth = 0.2;  // this share of the backlash
+constexpr double kWidths = 2;          // of the interval, outside of it
+constexpr double kFarOutside = 10e-6;  // m (angular mesh: rad), outside of it, and
+constexpr double kFarOfTruth = 0.2;    // this share of the backlash
 
 Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
   Random random(request.seed, static_cast<std::uint32_t>(index));
@@ -87,7 +87,7 @@ bool holds(const diagnosis::Estimate& e, double truth) {
 
 bool wrong_and_sure(const diagnosis::Estimate& e, double truth) {
   const double outside = std::max(e.lower - truth, truth - e.upper);
-  return outside > kWidths * width(e) || (outside > kFar && outside > kFarOfTruth * truth);
+  return outside > kWidths * width(e) || (outside > kFarOutside && outside > kFarOfTruth * truth);
 }
 
 struct Variant {
@@ -199,10 +199,10 @@ std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, boo
       held += holds(e, trial.backlash);
       row.wrong_and_sure += wrong_and_sure(e, trial.backlash);
     }
-    row.told = static_cast<int>(errors.size());
-    if (row.trials > 0) row.cannot_tell = 1 - static_cast<double>(row.told) / row.trials;
-    if (row.told > 0) {
-      row.coverage = static_cast<double>(held) / row.told;
+    row.answered = static_cast<int>(errors.size());
+    if (row.trials > 0) row.cannot_tell = 1 - static_cast<double>(row.answered) / row.trials;
+    if (row.answered > 0) {
+      row.coverage = static_cast<double>(held) / row.answered;
       row.p95_error = signal::quantile(errors, 0.95);
       row.median_error = signal::median(std::move(errors));
       row.median_width = signal::median(std::move(widths));

@@ -28,7 +28,8 @@ Command command() {
   Command c;
   c.name = "backlash_trend";
   c.summary =
-      "Tells from a joint's history of estimates how fast its backlash grows and when it reaches a limit.";
+      "Estimates from a joint's history of estimates how fast its backlash grows and when it reaches a "
+      "limit.";
   c.positional = {"HISTORY"};
   c.options = {
       {"rig", "RIG.yaml",
@@ -57,7 +58,7 @@ Command command() {
       "  0   no growth, or the limit is far\n"
       "  1   watch: the limit is reached within the horizon\n"
       "  2   the limit is exceeded\n"
-      "  3   inconclusive: no trend can be told\n";
+      "  3   inconclusive: no trend can be estimated\n";
   return c;
 }
 

@@ -45,7 +45,7 @@ Command command() {
       feedback_option(),
   };
   c.examples = {"build_curve config/sarkar_1997.yaml --out curve.yaml --plot curve.png"};
-  c.exit_codes = "  0   done (a stretch where skewness rises is flagged in the curve and told)\n";
+  c.exit_codes = "  0   done (a stretch where skewness rises is flagged in the curve and reported)\n";
   return c;
 }
 
@@ -59,7 +59,7 @@ studies::CurveRequest read_request(const Arguments& arguments) {
   return request;
 }
 
-void tell(const diagnosis::MonitoringCurve& curve, const std::string& out) {
+void print_curve(const diagnosis::MonitoringCurve& curve, const std::string& out) {
   const char* unit = curve.conditions.angular ? " rad" : " m";
   const diagnosis::CurvePoint &first = curve.points.front(), &last = curve.points.back();
   std::cout << fmt::format(
@@ -68,7 +68,7 @@ void tell(const diagnosis::MonitoringCurve& curve, const std::string& out) {
       curve.points.size(), curve.conditions.sampling_rate);
   if (curve.flat()) {
     std::cerr << "build_curve: the skewness of " << curve.conditions.signal
-              << " does not depend on backlash: no backlash can be told from it (flat curve)\n";
+              << " does not depend on backlash: no backlash can be estimated from it (flat curve)\n";
     return;
   }
   std::vector<std::string> rising;
@@ -100,7 +100,7 @@ int build(const Arguments& arguments) {
     curve = of_file(rig, [&] { return studies::build_curve(file, request, bar.progress()); });
   }
   write_text(out, curve.to_yaml());
-  if (!arguments.has("feedback")) tell(curve, out);
+  if (!arguments.has("feedback")) print_curve(curve, out);
   if (!plot.empty()) {
     std::cout.flush();
     plot_curve(out, plot);

@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "tools/common/command_line.h"
 #include "tools/common/for_arm.h"
+#include "tools/common/plot.h"
 #include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 #include "tools/common/serves.h"
@@ -24,6 +25,7 @@ Command command() {
   c.options = {
       {"rig", "RIG.yaml", "rig file of the joint or arm: signs, units and methods are held against it"},
       {"json", "OUT.json", "report to write"},
+      {"plot", "OUT.png", "also draw the channels as they were recorded, with what was found at its place"},
       {"joint", "NAME", "joint in a bag; default: the rig file's, else the only one"},
       {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
   };
@@ -33,7 +35,8 @@ Command command() {
       "(turns of a wrapped angle, single wild samples, repeated stamps); where something is cut they use "
       "what lies on "
       "one side; what is refused ends them with 65.";
-  c.examples = {"check_record run.bag --rig rig.yaml --json check.json", "check_record run.csv"};
+  c.examples = {"check_record run.bag --rig rig.yaml --json check.json",
+                "check_record run.csv --plot run.png"};
   c.exit_codes =
       "  0   the whole record can be used\n"
       "  1   only a part of it: something is cut\n"
@@ -56,9 +59,12 @@ Looked look_at_joint(const Arguments& arguments) {
     place.joint = arguments.text("joint");
     place.channels.declared = false;
   }
+  record::Record as_read = read_record(path, place);
+  std::vector<record::JointRecord> recorded;
+  if (arguments.has("plot")) recorded.push_back({"", as_read});
   record::CheckedRecord checked = record::check_record(
-      read_record(path, place), rig ? rig_file::declared_motion(rig->rig) : record::DeclaredMotion{});
-  Looked looked{{path, {{"", checked.check}}}, {}};
+      std::move(as_read), rig ? rig_file::declared_motion(rig->rig) : record::DeclaredMotion{});
+  Looked looked{{path, {{"", checked.check}}}, {}, std::move(recorded), rig && rig->rig.linear};
   const record::Stretch longest = record::longest_stretch(checked.check);
   looked.serves = serves_of(looked.file, std::move(checked.record).slice(longest.from, longest.to), rig);
   return looked;
@@ -68,7 +74,8 @@ Looked look(const Arguments& arguments) {
   const std::string& path = arguments.positional(0);
   if (!arguments.has("rig") && !arguments.has("joint") && std::filesystem::path(path).extension() == ".csv") {
     std::vector<record::JointRecord> joints = record::read_joints_csv(path);
-    if (joints.size() > 1) return look_at_joints(std::move(joints), path, std::nullopt);
+    if (joints.size() > 1)
+      return look_at_joints(std::move(joints), path, std::nullopt, arguments.has("plot"));
   }
   return look_at_joint(arguments);
 }
@@ -78,6 +85,11 @@ int check(const Arguments& arguments) {
   std::vector<std::string> inputs = {arguments.positional(0)};
   if (arguments.has("rig")) inputs.push_back(arguments.text("rig"));
   if (arguments.has("json")) check_output(arguments.text("json"), inputs);
+  if (arguments.has("plot")) {
+    check_plot_path(arguments.text("plot"));
+    if (arguments.has("json")) inputs.push_back(arguments.text("json"));
+    check_output(arguments.text("plot"), inputs);
+  }
   RecordDoor door("check_record");
   if (arguments.has("rig") && rig_file::is_arm_rig(arguments.text("rig")))
     return run_for_arm(arguments, door);

@@ -115,8 +115,8 @@ Json to_json(const identification::ComparedRecord& record, const std::string& pa
             {"speed_difference", numbers(record.speed_difference)}}}};
 }
 
-void tell(const std::vector<rig_file::RigFile>& files,
-          const std::vector<identification::ModelComparison>& models, std::size_t engagements) {
+void print_comparison(const std::vector<rig_file::RigFile>& files,
+                      const std::vector<identification::ModelComparison>& models, std::size_t engagements) {
   std::cout << std::fixed;
   const auto rows = [&](const char* title, Channels identification::ModelComparison::*channels) {
     std::cout << title << '\n';
@@ -192,7 +192,7 @@ int compare(const Arguments& arguments) {
   json.update(to_json(record, path));
   for (std::size_t i = 0; i < models.size(); ++i) json["models"].push_back(to_json(models[i], files[i]));
   write_text(out, door.with_findings(json.dump(-1, ' ', false, Json::error_handler_t::replace)));
-  tell(files, models, record.engagements.size());
+  print_comparison(files, models, record.engagements.size());
   std::cout.flush();
   if (arguments.has("plot")) plot_model_comparison(out, arguments.text("plot"));
   return kHealthy;

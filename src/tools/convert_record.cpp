@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/record/numbers.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -75,7 +76,8 @@ int convert(const Arguments& arguments) {
   if (arguments.has("topic")) place.topic = arguments.text("topic");
   std::vector<std::string> inputs = {in};
   if (arguments.has("rig")) inputs.push_back(arguments.text("rig"));
-  const record::Record record = part_of(read_record(in, place), arguments, in);
+  record::Record record = part_of(read_record(in, place), arguments, in);
+  record::keep_rows_with_numbers({&record});
   check_output(out, inputs);
   for (const std::string& warning : record.warnings)
     std::cerr << "convert_record: " << in << ": " << warning << '\n';

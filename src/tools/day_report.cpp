@@ -17,7 +17,7 @@ Command command() {
   Command c;
   c.name = "day_report";
   c.summary =
-      "Writes a page of the last day of a robot's joints: how much play each had, when that could be told, "
+      "Writes a page of the last day of a robot's joints: how much play each had, when that was estimated, "
       "and "
       "what has changed since when.";
   c.positional = {"HISTORY_FOLDER"};
@@ -35,10 +35,10 @@ Command command() {
       "JOINT_changes.csv of each joint. It may be read while they write.";
   c.examples = {"day_report ~/history --out day.html", "day_report ~/history --hours 168 --out week.html"};
   c.exit_codes =
-      "  0   no change, all that was told is good\n"
+      "  0   no change, all grades are good\n"
       "  1   watch: the last grade of a joint\n"
       "  2   a joint has changed, or its last grade is service or stop\n"
-      "  3   no estimate told the play of any joint, and no change; or all were good, and nothing "
+      "  3   no estimate states the play of any joint, and no change; or all were good, and nothing "
       "was reported since\n";
   return c;
 }
@@ -59,10 +59,10 @@ int exit_code(const report::Day& day) {
   const auto worse = [&code](int other) { code = code == kInconclusive ? other : std::max(code, other); };
   for (const report::JointDay& joint : day.joints) {
     if (!joint.changes.empty()) worse(kFault);
-    const auto told = std::find_if(joint.estimates.rbegin(), joint.estimates.rend(), report::tells);
-    if (told == joint.estimates.rend()) continue;
-    worse(told->grade == "service" || told->grade == "stop" ? kFault
-          : told->grade == "watch"                          ? kWatch
+    const auto last = std::find_if(joint.estimates.rbegin(), joint.estimates.rend(), report::has_play);
+    if (last == joint.estimates.rend()) continue;
+    worse(last->grade == "service" || last->grade == "stop" ? kFault
+          : last->grade == "watch"                          ? kWatch
                                                             : kHealthy);
   }
   return code == kHealthy && report::silent(day) ? kInconclusive : code;

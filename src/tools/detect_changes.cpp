@@ -60,7 +60,7 @@ Command command() {
   c.exit_codes =
       "  0   nothing has changed\n"
       "  2   something has\n"
-      "  3   the records cannot tell (too little motion, another gear train, something that no effect "
+      "  3   the records give no answer (too little motion, another gear train, something that no effect "
       "explains)\n";
   return c;
 }

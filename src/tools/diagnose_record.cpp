@@ -64,7 +64,7 @@ Command command() {
           "angle on "
           "the axis of motor_position [rad]; intervals hold with 95 %. ") +
       needs_of_methods() +
-      " The rig file of an arm (urdf) tells the play of each joint with motor_position and load_position, in "
+      " The rig file of an arm (urdf) gives the play of each joint with motor_position and load_position, in "
       "one run; only --rig and --json hold there.";
   c.examples = {
       "diagnose_record run.csv --rig config/sarkar_1997.yaml --json report.json --report report.html",
@@ -75,7 +75,7 @@ Command command() {
       "  0   healthy, or ungraded: no limits are given\n"
       "  1   watch\n"
       "  2   fault found: service or stop\n"
-      "  3   inconclusive: the estimates cannot tell, or not well enough for --save-baseline\n";
+      "  3   inconclusive: no estimate has an answer, or none good enough for --save-baseline\n";
   return c;
 }
 
@@ -256,7 +256,7 @@ report::Provenance provenance_of(const Arguments& arguments, const Inputs& in) {
   return p;
 }
 
-/// False where this diagnosis is no baseline, which is told.
+/// False where this diagnosis is no baseline; the reason is printed.
 bool save_baseline(const diagnosis::Diagnosis& diagnosis, const Inputs& in, const std::string& path) {
   diagnosis::Baseline baseline;
   try {

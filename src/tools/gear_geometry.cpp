@@ -35,7 +35,7 @@ Command command() {
   Command c;
   c.name = "gear_geometry";
   c.summary =
-      "Tells how a pair of external involute spur gears meets: radii, contact ratio, backlash from centre "
+      "Computes how a pair of external involute spur gears meets: radii, contact ratio, backlash from centre "
       "distance and "
       "tooth thinning (or the shim for a wanted backlash), and the stiffness along the mesh cycle.";
   c.options = {
@@ -59,7 +59,7 @@ Command command() {
       {"mesh-angle-deg", "DEG",
        "of the bracket: tangent of the mesh to the line from pivot to pinion; default: 0"},
       {"pinion-step-deg", "DEG",
-       "tells what one step of a position sensor on the pinion's shaft is at the teeth"},
+       "prints what one step of a position sensor on the pinion's shaft is at the teeth"},
       {"table", "N",
        "a table of N rows, from 0 to --centre-distance-change, --stop or --backlash, instead of one pair"},
       {"face-width", "M", "[m]" + fallback(kFaceWidth)},
@@ -76,7 +76,7 @@ Command command() {
       "stainless steel 303. Backlash is the full free play. A hinged bracket moves the centre by d r2/r1 "
       "cos(psi) for a stop setting d, r1 from pivot to stop, r2 from pivot to pinion (Yumrukcal 2013, Eqs. "
       "A.1 "
-      "to A.4); with --backlash the stop setting that gives it is told. plot_mesh_stiffness.py draws "
+      "to A.4); with --backlash the stop setting that gives it is printed. plot_mesh_stiffness.py draws "
       "OUT.json.";
   c.examples = {
       "gear_geometry --centre-distance-change 50e-6", "gear_geometry --backlash 50e-6",

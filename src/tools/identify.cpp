@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/findings/identification_report.h"
 #include "backlash_diagnosis/identification/fitted_rig.h"
+#include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
 #include "tools/common/command_line.h"
@@ -49,7 +50,7 @@ Command command() {
       "A rig with two inertias (rigid couplings, free link) is identified from motor_torque, motor_position "
       "and load_position; one "
       "inertia (mesh: rigid) and a locked output (link: locked) from motor_torque and motor_position. More "
-      "runs tell more: constant speeds both "
+      "runs identify more: constant speeds both "
       "ways (friction, gap "
       "over position), sine about a speed (inertia), sweep with bias (frequency response), square wave "
       "(damping), load moved by "
@@ -96,7 +97,8 @@ int identify_joint(const Arguments& arguments, RecordDoor& door) {
     record::Record record = read_record(path, place_of(file));
     record.name = std::filesystem::path(path).filename();
     for (record::Record& stretch : door.admit_stretches(std::move(record), declared, path))
-      records.push_back(std::move(stretch));
+      for (record::Record& part : record::parts_between_gaps(std::move(stretch)))
+        records.push_back(std::move(part));
   }
   identification::Identification found = of_file(file.source, [&] {
     ProgressBar bar;  // gone before anything is printed

@@ -130,7 +130,7 @@ Json study_json(const studies::IntegratorStudy& study, const studies::Integrator
   return json;
 }
 
-void tell_right(const studies::IntegratorStudy& study, const studies::IntegratorStudySettings& settings) {
+void print_accuracy(const studies::IntegratorStudy& study, const studies::IntegratorStudySettings& settings) {
   std::cout
       << "Loosest tolerance from which on a method is right to 1 % (scaled | plain absolute tolerances):\n"
       << std::setw(18) << "";
@@ -148,7 +148,7 @@ void tell_right(const studies::IntegratorStudy& study, const studies::Integrator
   }
 }
 
-void tell_cost(const studies::WorkPrecision& work) {
+void print_cost(const studies::WorkPrecision& work) {
   std::cout << "Evaluations (CPU time in ms) for an error, " << work.problem() << ":\n"
             << std::setw(18) << "";
   for (const double level : kLevels) std::cout << std::setw(19) << to_text(level);
@@ -180,8 +180,8 @@ int run_study(const Arguments& arguments) {
                     [&] { return studies::study_integrators(file, settings, bar.progress()); });
   }
   write_text(out, study_json(study, settings, file).dump() + "\n");
-  tell_right(study, settings);
-  for (const studies::WorkPrecision& work : study.work) tell_cost(work);
+  print_accuracy(study, settings);
+  for (const studies::WorkPrecision& work : study.work) print_cost(work);
   const studies::WorkPoint& own = study.rig_declared;
   std::cout << "The solver of " << rig << ", " << own.method << " at " << to_text(own.tolerance) << ": error "
             << own.error << ", " << own.evaluations << " evaluations\n";

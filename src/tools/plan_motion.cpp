@@ -45,8 +45,9 @@ Command command() {
       "are all "
       "that is known of the place: no walls, no collisions of the arm with itself. Watch the motion in a "
       "simulation of the cell, or slowly, before it is run. Of a URDF all joints that move are planned, from "
-      "0 rad, but those that --hold names; of its drives nothing is known, so that how much load their "
-      "friction hides is not told.";
+      "0 rad, but those that --hold names; its drives are unknown, so it is not reported how much of the "
+      "load "
+      "their friction hides.";
   c.examples = {
       "plan_motion config/two_link_arm/two_link_arm.yaml --out motion.yaml",
       "plan_motion robot.urdf --acceleration 5 --out motion.yaml --write-rig robot.yaml",
@@ -95,7 +96,7 @@ geared_arm::GearedArm arm_of(const Arguments& arguments) {
     throw BadData(
         path,
         "is the rig of one joint; a motion is planned for an arm (a rig file with urdf). A joint alone "
-        "needs no plan: it is told by the excitation of its rig file, see the test runs of identify and "
+        "needs no plan: it is moved by the excitation of its rig file, see the test runs of identify and "
         "doc/howto/excite_a_joint.md");
   geared_arm::GearedArm arm = geared_arm::load_geared_arm(path);
   check_outputs(arguments, {path, arm.rig.urdf});

@@ -113,7 +113,7 @@ std::string header(const studies::SearchFile& search, const studies::SearchResul
          to_text(std::round(1e4 * result.fit.rise) / 1e4) + ".\n";
 }
 
-void tell(const studies::CurveFit& fit, const studies::CurveTarget& target) {
+void print_fit(const studies::CurveFit& fit, const studies::CurveTarget& target) {
   std::cout << "half gap [um]  published  achieved  highest class [%]  largest torque [N m]\n";
   for (std::size_t i = 0; i < fit.published.size(); ++i) {
     const studies::CurveFit::Point& p = fit.published[i];
@@ -156,7 +156,7 @@ int search(const Arguments& arguments) {
   }
   json.update(fit_json(fit, search.target));
   if (!json_path.empty()) write_text(json_path, json.dump(2) + "\n");
-  tell(fit, search.target);
+  print_fit(fit, search.target);
   return kHealthy;
 }
 

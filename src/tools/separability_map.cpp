@@ -34,7 +34,8 @@ Command command() {
   Command c;
   c.name = "separability_map";
   c.summary =
-      "Maps where backlash can be told from sensor noise, viscous and dry friction and inertia of the motor, "
+      "Maps where backlash can be distinguished from sensor noise, viscous and dry friction and inertia of "
+      "the motor, "
       "a "
       "constant load torque, stiffness of couplings and contact, gain and delay of the torque sensor and a "
       "late load encoder: by the bare skewness, by apd_skewness, apd_shape, waveform and the verdict.";
@@ -143,7 +144,7 @@ std::string outcome(const std::vector<studies::SeparabilityCell>& row, std::size
                      largest);
 }
 
-void tell(const studies::Separability& all, bool angular) {
+void print_map(const studies::Separability& all, bool angular) {
   const double unit = angular ? 1e-3 : 1e-6;
   const std::string name = angular ? "mrad" : "um";
   for (const studies::SeparabilityMap& map : all.maps) {
@@ -199,7 +200,7 @@ int map(const Arguments& arguments) {
     std::cerr << "separability_map: the curve was made from another version of the rig file\n";
   const std::string source = given.empty() ? "built for this map" : given;
   write_text(out, to_json(all, file, curve, source, request).dump() + "\n");
-  tell(all, curve.conditions.angular);
+  print_map(all, curve.conditions.angular);
   if (arguments.has("plot")) {
     std::cout.flush();
     plot_separability_map(out, arguments.text("plot"));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Says what the model of a machine lacks, from records of it.
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 
@@ -7,6 +8,7 @@
 #include "backlash_diagnosis/findings/trace_folder.h"
 #include "backlash_diagnosis/identification/effects/traced_rig.h"
 #include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "tools/common/command_line.h"
@@ -57,7 +59,7 @@ Command command() {
   c.exit_codes =
       "  0   done: nothing is missing, or the effects that are were found and added\n"
       "  3   something is missing that no effect explains, be it beside effects that were found; or the "
-      "records do not tell the machine (report.json says why)\n";
+      "records do not determine the machine (report.json says why)\n";
   return c;
 }
 
@@ -94,6 +96,15 @@ record::Record read(const std::string& path, const rig_file::RigFile& rig) {
   return record;
 }
 
+record::Record longest(std::vector<record::Record> parts) {
+  const std::vector<std::string> warnings = parts.front().warnings;
+  record::Record part = *std::max_element(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
+    return a.time.back() - a.time.front() < b.time.back() - b.time.front();
+  });
+  part.warnings = warnings;
+  return part;
+}
+
 /// With the readers' warnings. Throws MissingInput, BadData, CannotWrite, CannotIdentify (records that do not
 /// serve), Cancelled; nothing is written then.
 identification::Trace run_trace(const TraceJob& job, RecordDoor& door, const Progress& progress) {
@@ -103,8 +114,10 @@ identification::Trace run_trace(const TraceJob& job, RecordDoor& door, const Pro
   const record::DeclaredMotion declared = rig_file::declared_motion(job.rig.rig);
   for (const std::string& path : job.train)
     for (record::Record& stretch : door.admit_stretches(read(path, job.rig), declared, path))
-      train.push_back(std::move(stretch));
-  const record::Record test = door.admit(read(job.test, job.rig), declared, job.test);
+      for (record::Record& part : record::parts_between_gaps(std::move(stretch)))
+        train.push_back(std::move(part));
+  const record::Record test =
+      longest(record::parts_between_gaps(door.admit(read(job.test, job.rig), declared, job.test)));
   for (const record::Record& record : train)
     for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
   for (const std::string& warning : test.warnings) warnings.push_back(test.name + ": " + warning);

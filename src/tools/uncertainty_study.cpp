@@ -56,7 +56,7 @@ Command command() {
 Json row_json(const studies::StudyRow& row) {
   return {{"method", row.method},
           {"records", row.trials},
-          {"told", row.told},
+          {"told", row.answered},
           {"median_error", report::json_number(row.median_error)},
           {"p95_error", report::json_number(row.p95_error)},
           {"median_width", report::json_number(row.median_width)},
@@ -96,7 +96,7 @@ void print(const Table& table) {
                "wrong and sure\n";
   for (const studies::StudyRow& row : table.rows) {
     std::cout << "  " << std::left << std::setw(22) << row.method << std::right << std::setw(6) << row.trials;
-    if (row.told == 0) {
+    if (row.answered == 0) {
       std::cout << "    -\n";
       continue;
     }

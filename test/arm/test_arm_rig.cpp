@@ -96,27 +96,27 @@ TEST_F(ArmRigFile, WrongFilesAreRefusedWithTheirPlace) {
 }
 
 TEST_F(ArmRigFile, WrongEffectsOfAJointAreRefused) {
-  const auto told = [&](const std::string& effect) {
+  const auto outcome = [&](const std::string& effect) {
     return refusal(
         with(rig_, "  - name: wrist_3_joint", "  - name: wrist_3_joint\n    effects: [{" + effect + "}]"));
   };
-  EXPECT_EQ(told("id: stribeck, torque: 1, speed: 0.1"), "accepted");
-  EXPECT_NE(told("id: stribek, torque: 1, speed: 0.1").find("stribek"), std::string::npos);
-  EXPECT_NE(told("id: stribeck, torque: -1, speed: 0.1").find("torque"), std::string::npos);
-  EXPECT_NE(told("id: stribeck, torque: 1, speed: 0").find("speed"), std::string::npos);
-  EXPECT_NE(told("id: stribeck, torque: 1, speed: 0.1, sped: 1").find("sped"), std::string::npos);
-  EXPECT_EQ(told("id: motor_torque_gain, gain: -0.2"), "accepted");
-  EXPECT_NE(told("id: motor_torque_gain, gain: -1").find("gain"),
+  EXPECT_EQ(outcome("id: stribeck, torque: 1, speed: 0.1"), "accepted");
+  EXPECT_NE(outcome("id: stribek, torque: 1, speed: 0.1").find("stribek"), std::string::npos);
+  EXPECT_NE(outcome("id: stribeck, torque: -1, speed: 0.1").find("torque"), std::string::npos);
+  EXPECT_NE(outcome("id: stribeck, torque: 1, speed: 0").find("speed"), std::string::npos);
+  EXPECT_NE(outcome("id: stribeck, torque: 1, speed: 0.1, sped: 1").find("sped"), std::string::npos);
+  EXPECT_EQ(outcome("id: motor_torque_gain, gain: -0.2"), "accepted");
+  EXPECT_NE(outcome("id: motor_torque_gain, gain: -1").find("gain"),
             std::string::npos);  // a motor without torque
-  EXPECT_NE(told("id: cogging, amplitude: 1, order: 3").find("phase"), std::string::npos);
+  EXPECT_NE(outcome("id: cogging, amplitude: 1, order: 3").find("phase"), std::string::npos);
   for (const char* joint : {"wrist_3_joint", "wrist_9_joint"})
-    EXPECT_NE(told(std::string("id: transmission_coupling, ratio: 0.1, joint: ") + joint).find(joint),
+    EXPECT_NE(outcome(std::string("id: transmission_coupling, ratio: 0.1, joint: ") + joint).find(joint),
               std::string::npos);
 }
 
 TEST_F(ArmRigFile, WrongRobotsAreRefused) {
   const std::vector<std::string> joints = load_arm_rig(path("ur10e_arm.yaml")).joint_names();
-  const auto told = [&](const std::string& text, std::vector<std::string> names) {
+  const auto outcome = [&](const std::string& text, std::vector<std::string> names) {
     try {
       chain_of_urdf(text, "x.urdf", names);
     } catch (const BadData& error) {
@@ -124,18 +124,18 @@ TEST_F(ArmRigFile, WrongRobotsAreRefused) {
     }
     return std::string("accepted");
   };
-  EXPECT_EQ(told(urdf_, joints), "accepted");
-  EXPECT_NE(told("nonsense", joints).find("cannot be read as a URDF"), std::string::npos);
-  EXPECT_NE(told(urdf_, {"elbow_joint", "shoulder_lift_joint"}).find("not the next of one chain"),
+  EXPECT_EQ(outcome(urdf_, joints), "accepted");
+  EXPECT_NE(outcome("nonsense", joints).find("cannot be read as a URDF"), std::string::npos);
+  EXPECT_NE(outcome(urdf_, {"elbow_joint", "shoulder_lift_joint"}).find("not the next of one chain"),
             std::string::npos);
-  EXPECT_NE(told(urdf_, {"shoulder_pan_joint", "elbow_joint"}).find("moves and is not one of the rig's"),
+  EXPECT_NE(outcome(urdf_, {"shoulder_pan_joint", "elbow_joint"}).find("moves and is not one of the rig's"),
             std::string::npos);
-  EXPECT_NE(told(urdf_, {"tool0_joint"}).find("neither revolute nor continuous"), std::string::npos);
-  EXPECT_NE(
-      told(with(urdf_, "name=\"elbow_joint\" type=\"revolute\"", "name=\"elbow_joint\" type=\"prismatic\""),
-           joints)
-          .find("neither revolute nor continuous"),
-      std::string::npos);
+  EXPECT_NE(outcome(urdf_, {"tool0_joint"}).find("neither revolute nor continuous"), std::string::npos);
+  EXPECT_NE(outcome(with(urdf_, "name=\"elbow_joint\" type=\"revolute\"",
+                         "name=\"elbow_joint\" type=\"prismatic\""),
+                    joints)
+                .find("neither revolute nor continuous"),
+            std::string::npos);
 }
 
 // A tool in a macro would be left out, and gravity with it.
@@ -211,7 +211,7 @@ TEST_F(ArmRigFile, JointsThatAreHeldBelongToTheLinkThatCarriesThem) {
   const Chain wrist = read_chain(path("gripper.urdf"), {"wrist"}, {{"hinge", M_PI / 2}, {"left", 0}});
   EXPECT_LT((wrist.joints[0].position - Eigen::Vector3d(0, 0, 1)).norm(), 1e-12);
 
-  const auto told = [&](const std::vector<std::string>& names, const HeldJoints& still) {
+  const auto outcome = [&](const std::vector<std::string>& names, const HeldJoints& still) {
     try {
       chain_of_urdf(urdf, "x.urdf", names, still);
     } catch (const BadData& error) {
@@ -219,15 +219,15 @@ TEST_F(ArmRigFile, JointsThatAreHeldBelongToTheLinkThatCarriesThem) {
     }
     return std::string("accepted");
   };
-  EXPECT_NE(told({"hinge", "wrist"}, {{"right", 0}}).find("'left' moves and is not"), std::string::npos);
-  EXPECT_NE(told({"hinge", "wrist"}, {{"finger", 0}}).find("no joint 'finger'"), std::string::npos);
-  EXPECT_NE(told({"hinge", "wrist"}, {{"wrist", 0}, {"left", 0}}).find("held and one"), std::string::npos);
-  EXPECT_EQ(told({"hinge", "wrist"}, {{"left", 0}, {"right", 0.01}}), "accepted");
+  EXPECT_NE(outcome({"hinge", "wrist"}, {{"right", 0}}).find("'left' moves and is not"), std::string::npos);
+  EXPECT_NE(outcome({"hinge", "wrist"}, {{"finger", 0}}).find("no joint 'finger'"), std::string::npos);
+  EXPECT_NE(outcome({"hinge", "wrist"}, {{"wrist", 0}, {"left", 0}}).find("held and one"), std::string::npos);
+  EXPECT_EQ(outcome({"hinge", "wrist"}, {{"left", 0}, {"right", 0.01}}), "accepted");
 }
 
 // Theory: a cloud of masses has a positive definite pseudo inertia, a body whose inertia breaks the triangle
 // rule has not.
-TEST(Body, PseudoInertiaTellsWhatIsPhysical) {
+TEST(Body, PseudoInertiaShowsWhatIsPhysical) {
   Body b;
   b.mass = 2;
   b.centre = {0.1, -0.2, 0.3};

@@ -28,7 +28,7 @@ std::vector<FittedMotion> fitted(const std::vector<ArmMotion>& motions) {
   return all;
 }
 
-TEST(Fit, FindsDrivesAndForetellsAnotherMotion) {
+TEST(Fit, FindsDrivesAndPredictsAnotherMotion) {
   int far = 0, values = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const test::Machine machine(seed);
@@ -120,7 +120,7 @@ TEST(Trace, NamesNothingWhereNothingHasChanged) {
   }
 }
 
-// The same body, mounted in another place: the fitted machine tells that of the test record, and the same
+// The same body, mounted in another place: the fitted machine finds that of the test record, and the same
 // mass.
 TEST(Trace, OfAFittedMachineThePayloadOfTheTestRecordCounts) {
   const test::Machine machine(9);
@@ -166,7 +166,7 @@ TEST(Trace, WarmingUpIsNoEffect) {
   const ArmTrace trace = trace_arm(machine.declared, {machine.record(1)}, warm.record(2), false);
   EXPECT_TRUE(trace.steps.empty());
   EXPECT_FALSE(trace.unexplained) << trace.unexplained->channel << trace.unexplained->signature;
-  EXPECT_EQ(trace.notes.size(), 6u);  // told, joint by joint
+  EXPECT_EQ(trace.notes.size(), 6u);  // reported, joint by joint
 }
 
 // A cable that pulls as a spring: no effect of the dictionary, and the joint is not as it was trained.

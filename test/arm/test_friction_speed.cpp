@@ -27,10 +27,10 @@ Trained trained(const test::Machine& machine, double declared, std::size_t joint
   return t;
 }
 
-TEST(FrictionSpeed, IsToldWhereTheRigFileHasAnotherOne) {
+TEST(FrictionSpeed, IsEstimatedWhereTheRigFileHasAnotherOne) {
   const Trained t = trained(test::Machine(5), 8 * kTrue, 1);
   for (std::size_t j = 0; j < t.rig.joints.size(); ++j) {
-    // Octaves are tried; a low-pass of 5 Hz hardly tells what is below the true one.
+    // Octaves are tried; a low-pass of 5 Hz hardly shows what is below the true one.
     EXPECT_GE(t.rig.friction_speed(j), j == 1 ? kTrue : kTrue / 2) << j;
     EXPECT_LE(t.rig.friction_speed(j), j == 1 ? 2 * kTrue : kTrue) << j;
   }

@@ -97,7 +97,7 @@ TEST(KnownWeight, AWrongOneIsSaid) {
   const ArmFit fit = fit_records(w.machine.declared, two, {}, nullptr, {std::nullopt, Carried{{25, 0.02}}});
   bool said = false;
   for (const std::string& warning : fit.warnings)
-    said = said || warning.find("look whether the weight is right") != std::string::npos;
+    said = said || warning.find("check the weight") != std::string::npos;
   EXPECT_TRUE(said);
   EXPECT_THROW(fit_records(w.machine.declared, {w.records[1]}, {}, nullptr, {Carried{{2.5, 0.01}}}),
                CannotIdentify);

@@ -31,7 +31,7 @@ TEST(Error, CancelledSaysSo) {
   EXPECT_STREQ(Cancelled().what(), "cancelled");
 }
 
-// Boundaries catch Error once and tell the kinds apart for the exit code.
+// Boundaries catch Error once and distinguish the kinds for the exit code.
 template <typename Kind>
 bool is_only(const Error& error) {
   const int kinds = (dynamic_cast<const InvalidParameter*>(&error) != nullptr) +

@@ -147,7 +147,7 @@ def trace(folder, tracer, rig, timeout):
 
 
 def without_equivalents(true, found, truth):
-    """What was found, with names that cannot be told apart from the true ones replaced by these."""
+    """What was found, with names that cannot be distinguished from the true ones replaced by these."""
     found = set(found)
     for effect, others in truth.get("indistinguishable", {}).items():
         if effect not in found and found & set(others) - true:

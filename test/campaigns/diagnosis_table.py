@@ -62,7 +62,7 @@ def judge(value, lower, upper, low, high):
 
 
 def motor_alone(path):
-    """The record without what a load encoder tells, in a file beside it."""
+    """The record without the load encoder, in a file beside it."""
     motor = path.with_name(f"{path.stem}_motor.csv")
     if not motor.is_file() or motor.stat().st_mtime < path.stat().st_mtime:
         with open(path, newline="", encoding="utf-8") as whole, open(motor, "w", newline="", encoding="utf-8") as part:

@@ -12,12 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "tools/command_runner.h"
+#include "machine_folder.h"
 
 namespace backlash::test {
 namespace {
-
-using Values = std::vector<double>;
 
 constexpr double kInterval = 1e-3;  // s
 constexpr int kReach = 40;          // samples, half of what the low-pass looks at
@@ -76,19 +74,13 @@ double acceleration_gain() {
   return std::sqrt(sum);
 }
 
-double rms(const Values& values) {
-  double sum = 0;
-  for (double v : values) sum += v * v;
-  return std::sqrt(sum / static_cast<double>(values.size()));
-}
-
 double median_size(Values values) {
   for (double& v : values) v = std::abs(v);
   std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2), values.end());
   return values[values.size() / 2];
 }
 
-class MakeMachine : public CommandTest {
+class MakeMachine : public MachineFolder {
  protected:
   void make(const std::string& arguments, const std::string& folder = "machine") {
     done("make_machine " + arguments + " --out " + folder);
@@ -114,22 +106,7 @@ class MakeMachine : public CommandTest {
     return result;
   }
 
-  Values column(const std::string& name, std::size_t which) const {
-    std::istringstream text(read(name));
-    std::string line;
-    std::getline(text, line);
-    Values result;
-    while (std::getline(text, line)) {
-      std::istringstream cells(line);
-      std::string cell;
-      for (std::size_t i = 0; i <= which; ++i) std::getline(cells, cell, ',');
-      result.push_back(std::stod(cell));
-    }
-    return result;
-  }
-
   double rig(const char* name) const { return truth_["rig"][name]["value"]; }
-  double of(const char* effect, const char* name) const { return truth_["undeclared_effects"][effect][name]; }
 
   using Extra = std::function<double(double position)>;
 
@@ -179,7 +156,6 @@ class MakeMachine : public CommandTest {
     }
   }
 
-  nlohmann::json truth_;
   MachineRecord train_, test_;
 };
 
@@ -314,7 +290,7 @@ TEST_F(MakeMachine, TeethAreAsTheTruthSays) {
   }
   ASSERT_GT(residual.size(), 1000u);
   // The load encoder's steps, as an angle and as the torque that follows from them. The median, for a
-  // low-passed torque does not tell every bounce; half more, as the steps are not quite white. The
+  // low-passed torque does not show every bounce; half more, as the steps are not quite white. The
   // transmission error is 4e-5 rad and more.
   const double steps = 7e-6 / std::sqrt(12.0);
   const double noise =
@@ -357,86 +333,6 @@ TEST_F(MakeMachine, ASlowRecorderLeavesSamplesOut) {
   const Values part = column("slow/train.csv", 2);
   ASSERT_EQ(part.size(), 400u);
   for (std::size_t k = 0; k < part.size(); ++k) ASSERT_EQ(part[k], whole[5 * k]) << k;
-}
-
-/// Joints, whose current is held against Newton's law, written down here anew, where they slide.
-class MakeJoint : public MakeMachine {
- protected:
-  struct Sliding {
-    double time, position, speed, acceleration, current;
-  };
-  double own(const char* name) const { return truth_["joint"][name].get<double>(); }
-
-  std::vector<Sliding> slides(const std::string& effects) {
-    done("make_machine --machine joint --seed 12 --rate 500 --duration 40 --effects " + effects +
-         " --out joint");
-    truth_ = nlohmann::json::parse(read("joint/truth.json"));
-    const Values time = column("joint/train.csv", 0), current = column("joint/train.csv", 1);
-    const Values q = column("joint/train.csv", 2);
-    // Over 2 n samples of whatever distance a parabola through three points: its slope and curvature.
-    const std::size_t n = 20;
-    std::vector<Sliding> all;
-    for (std::size_t k = n; k + n < q.size(); ++k) {
-      const double before = time[k] - time[k - n], after = time[k + n] - time[k];
-      const double first = (q[k] - q[k - n]) / before, second = (q[k + n] - q[k]) / after;
-      const double speed = (first * after + second * before) / (before + after);
-      const double acceleration = 2 * (second - first) / (before + after);
-      if (std::abs(speed) >= 0.3) all.push_back({time[k], q[k], speed, acceleration, current[k]});
-    }
-    return all;
-  }
-  double friction(const Sliding& s, double more = 0) const {
-    return own("viscous") * s.speed + std::copysign(own("coulomb") + more, s.speed);
-  }
-  /// Noise of the current and, of similar size, what 40 ms of curvature hide of the loop's answer to it.
-  double noise() const { return 2 * own("noise") + 0.02; }
-};
-
-double root_of_mean_square(const Values& values) {
-  double sum = 0;
-  for (const double v : values) sum += v * v;
-  return std::sqrt(sum / double(values.size()));
-}
-
-TEST_F(MakeJoint, KeepsNewtonsLaw) {
-  Values current, wrong;
-  for (const Sliding& s : slides("gravity,load_dependent_friction")) {
-    const double load =
-        own("inertia") * s.acceleration + of("gravity", "A") * std::sin(s.position + of("gravity", "p"));
-    current.push_back(s.current);
-    wrong.push_back(s.current - load - friction(s, of("load_dependent_friction", "A") * std::abs(load)));
-  }
-  ASSERT_GT(current.size(), 3000u);
-  EXPECT_LT(root_of_mean_square(wrong), noise());
-  EXPECT_GT(root_of_mean_square(current), 1);
-  EXPECT_TRUE(truth_["outside_dictionary"].empty());
-}
-
-TEST_F(MakeJoint, ALoadIsTakenUpOnTheWay) {
-  Values before, after, without;
-  for (const Sliding& s : slides("payload_step")) {
-    const double left = s.current - own("inertia") * s.acceleration - friction(s);
-    const double load = of("payload_step", "A") * std::sin(s.position);
-    if (s.time < of("payload_step", "t"))
-      before.push_back(left);
-    else
-      after.push_back(left - load), without.push_back(left);
-  }
-  ASSERT_GT(std::min(before.size(), after.size()), 1000u);
-  EXPECT_LT(root_of_mean_square(before), noise());
-  EXPECT_LT(root_of_mean_square(after), noise());
-  EXPECT_GT(root_of_mean_square(without), 4 * noise());
-  EXPECT_EQ(truth_["outside_dictionary"], nlohmann::json({"payload_step"}));
-}
-
-// A sine over time has its amplitude over the root of 2; that over the samples which slide is within a fifth.
-TEST_F(MakeJoint, ATorqueFromOutsideSwingsInTime) {
-  Values left;
-  for (const Sliding& s : slides("outside_torque"))
-    left.push_back(s.current - own("inertia") * s.acceleration - friction(s));
-  const double amplitude = of("outside_torque", "A");
-  EXPECT_NEAR(root_of_mean_square(left), amplitude / std::sqrt(2), 0.2 * amplitude);
-  EXPECT_NEAR(*std::max_element(left.begin(), left.end()), amplitude, 0.1 * amplitude + 3 * noise());
 }
 
 TEST_F(MakeMachine, RefusesWhatItDoesNotKnow) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSince = 33;  // s
 
-std::string told(const Changes& changes) {
+std::string text_of(const Changes& changes) {
   std::string text = "cannot tell: " + changes.cannot_tell;
   for (const Change& c : changes.changes)
     text += "\n" + c.effect + " of " + c.joint + " since " + to_text(c.since) + ", like " + joined(c.alike);
@@ -38,8 +38,8 @@ test::Machine carrying(test::Machine machine, std::size_t link, double mass) {
 
 /// The only one; an empty one where it is not.
 Change only(const Changes& changes) {
-  EXPECT_EQ(changes.changes.size(), 1U) << told(changes);
-  EXPECT_EQ(changes.cannot_tell, "") << told(changes);
+  EXPECT_EQ(changes.changes.size(), 1U) << text_of(changes);
+  EXPECT_EQ(changes.cannot_tell, "") << text_of(changes);
   return changes.changes.size() == 1 ? changes.changes.front() : Change();
 }
 
@@ -58,16 +58,16 @@ void expect_size(const Change& change, const std::string& name, double truth) {
   ADD_FAILURE() << change.effect << " has no " << name;
 }
 
-TEST(ArmChanges, AHealthyArmInAnotherTaskIsNotToldAsChanged) {
+TEST(ArmChanges, AHealthyArmInAnotherTaskIsNotChanged) {
   for (const std::uint64_t seed : {1, 2}) {
     const test::Machine machine(seed);
     const Changes found = changes_of(machine, machine, seed);
-    EXPECT_TRUE(found.changes.empty() && found.cannot_tell.empty()) << told(found);
+    EXPECT_TRUE(found.changes.empty() && found.cannot_tell.empty()) << text_of(found);
     EXPECT_GT(found.windows, 10U);
   }
 }
 
-TEST(ArmChanges, WhatItTakesUpIsToldWithMassAndPlace) {
+TEST(ArmChanges, WhatItTakesUpIsReportedWithMassAndPlace) {
   const test::Machine machine(2);
   const Changes found = changes_of(machine, carrying(machine, 5, 2), 2);
   const Change change = only(found);
@@ -84,7 +84,7 @@ TEST(ArmChanges, WhatItTakesUpIsToldWithMassAndPlace) {
   EXPECT_EQ(change.until, std::nullopt);
 }
 
-TEST(ArmChanges, WhatHangsAtTheForearmIsNotToldAtTheTool) {
+TEST(ArmChanges, WhatHangsAtTheForearmIsNotNamedAtTheTool) {
   const test::Machine machine(1);
   const Change change = only(changes_of(machine, carrying(machine, 2, 2), 1));
   EXPECT_EQ(change.link, "forearm_link");
@@ -102,7 +102,7 @@ TEST(ArmChanges, WhatIsPutDownHasANegativeMass) {
   expect_since(change, kSince);
 }
 
-TEST(ArmChanges, FrictionIsToldOfItsJoint) {
+TEST(ArmChanges, FrictionIsNamedAtItsJoint) {
   const test::Machine machine(4);
   test::Machine rubbing = machine;
   rubbing.drives[3].terms[std::size_t(arm::DriveTerm::coulomb)] *= 1.3;
@@ -133,10 +133,10 @@ TEST(ArmChanges, AnotherDayAndAnotherToolAreNoChangeWithinTheRecord) {
   for (arm::JointDrive& drive : cold.drives) drive.terms[std::size_t(arm::DriveTerm::coulomb)] *= 1.1;
   const Changes found =
       detect_changes(machine.declared, {machine.record(51, 40), machine.record(52, 40)}, cold.record(53, 60));
-  EXPECT_TRUE(found.changes.empty()) << told(found);
+  EXPECT_TRUE(found.changes.empty()) << text_of(found);
   EXPECT_NE(std::find(found.different.begin(), found.different.end(), "payload at wrist_3_link"),
             found.different.end())
-      << told(found);
+      << text_of(found);
 }
 
 // Friction is 30 % larger and falls while the robot warms up, as it did when it was learned from cold.
@@ -146,11 +146,11 @@ TEST(ArmChanges, WarmingUpIsNoChange) {
   cold.cold = 0.3;
   const Changes found =
       detect_changes(machine.declared, {cold.record(61, 60), machine.record(62, 40)}, cold.record(63, 60));
-  EXPECT_TRUE(found.changes.empty()) << told(found);
+  EXPECT_TRUE(found.changes.empty()) << text_of(found);
 }
 
 // Taken up and put down again and again, each time for 20 s: too much for one record, but nothing else is
-// told.
+// reported.
 TEST(ArmChanges, WhatIsTakenUpAndPutDownAgainAndAgainIsNothingElse) {
   const test::Machine machine(7);
   arm::ArmRecord record = machine.record(71, 130);
@@ -162,9 +162,9 @@ TEST(ArmChanges, WhatIsTakenUpAndPutDownAgainAndAgainIsNothingElse) {
             loaded.joints[j].column(record::Channel::motor_current)[k];
   const Changes found =
       detect_changes(machine.declared, {machine.record(72, 40), machine.record(73, 40)}, record);
-  EXPECT_FALSE(found.changes.empty() && found.cannot_tell.empty()) << told(found);
+  EXPECT_FALSE(found.changes.empty() && found.cannot_tell.empty()) << text_of(found);
   for (const Change& c : found.changes)
-    EXPECT_TRUE(c.effect == "payload" || c.effect == "unknown") << told(found);
+    EXPECT_TRUE(c.effect == "payload" || c.effect == "unknown") << text_of(found);
 }
 
 // A joint that stands still in this task may have changed and nobody would see it.
@@ -177,7 +177,7 @@ TEST(ArmChanges, AJointThatDoesNotMoveIsNotCalledHealthy) {
     std::fill(still.column(c).begin(), still.column(c).end(), c == record::Channel::motor_position ? 0.3 : 0);
   const Changes found =
       detect_changes(machine.declared, {machine.record(82, 40), machine.record(83, 40)}, record);
-  ASSERT_EQ(found.unjudged.size(), 1U) << told(found);
+  ASSERT_EQ(found.unjudged.size(), 1U) << text_of(found);
   EXPECT_EQ(found.unjudged[0].joint, "wrist_3_joint");
   EXPECT_NE(found.unjudged[0].why.find("moves for"), std::string::npos) << found.unjudged[0].why;
 }

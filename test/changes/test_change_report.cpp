@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is told of changes that were put together by hand.
+// What is reported of changes that were put together by hand.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

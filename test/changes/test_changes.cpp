@@ -75,7 +75,7 @@ Changes changes_of(const record::Record& record, double false_alarms_per_hour = 
   return detect_changes(one_inertia(), {made(1, 200, nothing), made(2, 200, nothing)}, record, settings);
 }
 
-TEST(Changes, NothingIsToldOfHealthyRecords) {
+TEST(Changes, NothingIsReportedOfHealthyRecords) {
   // Ten records of 200 s at one false alarm a month: 1 in 1300 would be chance.
   for (unsigned seed = 10; seed < 20; ++seed) {
     const Changes found = changes_of(made(seed, 200, nothing));
@@ -165,7 +165,7 @@ TEST(Changes, AGravityThatIsNearlyAConstantIsNoOffset) {
   EXPECT_EQ(found.changes.front().effect, "gravity");
 }
 
-std::string told(const Changes& found) {
+std::string text_of(const Changes& found) {
   std::string all;
   for (const Change& c : found.changes)
     all += c.effect + (c.size.empty() ? "" : " " + std::to_string(c.size.front().measured.value)) +
@@ -178,7 +178,7 @@ TEST(Changes, FrictionThatWandersHasNone) {
   const Added wander = [](const Motion& m) {
     return 0.03 * 0.75 * sign(m.w) * std::sin(2 * M_PI * m.t / 120 + 1);
   };
-  for (unsigned seed = 70; seed < 74; ++seed) EXPECT_EQ(told(changes_of(made(seed, 240, wander))), "");
+  for (unsigned seed = 70; seed < 74; ++seed) EXPECT_EQ(text_of(changes_of(made(seed, 240, wander))), "");
 }
 
 // Of a machine with more friction at rest, which falls as it warms up, too: begun cold, and begun warm.
@@ -193,8 +193,8 @@ TEST(Changes, AWarmUpOfAllFrictionIsNone) {
         << from;
 }
 
-// Friction that grows moving forward only is two effects at once, of which the larger is told. That it shows
-// late, with the next move forward, is in its interval.
+// Friction that grows moving forward only is two effects at once, of which the larger is reported. That it
+// shows late, with the next move forward, is in its interval.
 TEST(Changes, TheOnsetOfFrictionOfOneDirectionHolds) {
   for (unsigned seed = 90; seed < 96; ++seed) {
     const Changes found =
@@ -205,7 +205,7 @@ TEST(Changes, TheOnsetOfFrictionOfOneDirectionHolds) {
   }
 }
 
-TEST(Changes, ThatEndAreToldWithTheirEnd) {
+TEST(Changes, ThatEndAreReportedWithTheirEnd) {
   const Changes found =
       changes_of(made(40, 200, [](const Motion& m) { return m.t < 70 || m.t > 140 ? 0 : 0.2 * sign(m.w); }));
   ASSERT_EQ(found.changes.size(), 1u);
@@ -235,7 +235,7 @@ struct Fault {
 
 class LocalFaultOf : public testing::TestWithParam<Fault> {};
 
-TEST_P(LocalFaultOf, IsToldWithItsPlace) {
+TEST_P(LocalFaultOf, IsReportedWithItsPlace) {
   const Changes found = changes_of(made(30, 200, GetParam().added));
   ASSERT_EQ(found.changes.size(), 1u);
   const Change& c = found.changes.front();

@@ -47,7 +47,7 @@ std::string refusal(const rig_file::RigFile& file, const record::Record& healthy
   return "";
 }
 
-TEST(ChangesOfRig, MorePlayIsTold) {
+TEST(ChangesOfRig, MorePlayIsReported) {
   rig_file::RigFile file = machine();
   file.simulation.sensors.seed = 2;
   const record::Record record = test::changing_record(file, kDuration, {"backlash", 0.2}, kOnset);
@@ -61,7 +61,7 @@ TEST(ChangesOfRig, MorePlayIsTold) {
   ASSERT_EQ(c.size.size(), 2u);
   EXPECT_EQ(c.size[0].name, "backlash");
   EXPECT_EQ(c.size[0].unit, "m");
-  // `waveform` tells a play within 0.6 um; an angle is that over the base radius.
+  // `waveform` estimates a play within 0.6 um; an angle is that over the base radius.
   EXPECT_NEAR(c.size[0].measured.value, 1e-5, 0.6e-6);
   EXPECT_NEAR(c.size[0].measured.value, 1e-5, 2 * c.size[0].measured.standard_error);
   EXPECT_NEAR(c.size[1].measured.value * file.rig.mesh.base_radius, c.size[0].measured.value, 1e-12);

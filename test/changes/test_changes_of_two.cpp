@@ -122,7 +122,7 @@ Changes changes_of(const record::Record& record, const model::Rig& rig = two_ine
   return detect_changes(rig, healthy, record);
 }
 
-TEST(ChangesOfTwo, NothingIsToldOfHealthyRecords) {
+TEST(ChangesOfTwo, NothingIsReportedOfHealthyRecords) {
   for (unsigned seed = 10; seed < 15; ++seed) {
     const Changes found = changes_of(made(seed, nothing));
     EXPECT_TRUE(found.changes.empty()) << seed << " " << found.changes.front().effect;
@@ -182,7 +182,7 @@ const Case kCases[] = {
 INSTANTIATE_TEST_SUITE_P(Effects, ChangesOfTwoBy, testing::ValuesIn(kCases),
                          [](const auto& info) { return info.param.name; });
 
-TEST(ChangesOfTwo, GrowingBacklashIsToldWithWhatItGrewBy) {
+TEST(ChangesOfTwo, GrowingBacklashIsReportedWithWhatItGrewBy) {
   const Changes found =
       changes_of(made(31, [](Machine& m, double t) { m.backlash += 1e-4 * std::max(0.0, t - kOnset) / 80; }));
   ASSERT_EQ(found.changes.size(), 1u);
@@ -215,7 +215,7 @@ TEST(ChangesOfTwo, ThatFollowNoEffectAreUnknown) {
   }
 }
 
-TEST(ChangesOfTwo, ThatAnotherTaskMightExplainCannotBeTold) {
+TEST(ChangesOfTwo, ThatAnotherTaskMightExplainAreNoAnswer) {
   // Rms 2.1e-6 rad beside 1.2e-6 of noise: squares 4.2 times as large, of which the limits are 4 and 16.
   const Changes found = changes_of(made(30, [](Machine& m, double t) {
     if (t > kOnset) m.slip = 3e-6 * std::sin(M_PI * t);
@@ -254,7 +254,7 @@ TEST(ChangesOfTwo, WithoutTheLoadsEncoderTheBacklashIsNotAsked) {
   const Changes friction = found([](Machine& m, double t) { m.load_coulomb += t < kOnset ? 0 : 8; });
   ASSERT_EQ(friction.changes.size(), 1u);
   EXPECT_EQ(friction.changes[0].effect, "motor_coulomb");
-  // On which side of the gap is not told.
+  // On which side of the gap is not known.
   EXPECT_EQ(std::count(friction.changes[0].alike.begin(), friction.changes[0].alike.end(), "load_coulomb"),
             1);
 }

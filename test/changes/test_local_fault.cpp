@@ -72,11 +72,11 @@ TEST(LocalFault, IsNotSeenInNoise) {
   EXPECT_LT(repeated(m), 30);  // chi-square of two degrees: 3e-7
 }
 
-TEST(LocalFault, IsToldByManyPasses) {
+TEST(LocalFault, IsShownByManyPasses) {
   EXPECT_GT(repeated(made(fault)), 100);
 }
 
-TEST(LocalFault, IsNotToldByAPush) {
+TEST(LocalFault, IsNotShownByAPush) {
   // One pass of it, twenty times as strong.
   double begun = 0;
   const Made m = made([&](const Moment& at) {

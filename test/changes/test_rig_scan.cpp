@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Scores that the test draws from their definition: mean J d, covariance J, of three values that are told
-// together. What is drawn is the truth.
+// Scores that the test draws from their definition: mean J d, covariance J, of three values that are
+// estimated together. What is drawn is the truth.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -111,7 +111,7 @@ TEST(RigScan, TwoValuesAtOnceLeaveWhatNoNameExplains) {
   const auto both = [](double t) { return Eigen::Vector3d(t < 103 ? 0 : 0.1, t < 103 ? 0 : -0.1, 0); };
   const RigScan scan(healthy, stretches(healthy, 4, both), kNever, settings);
   const RigScan::Found found = scan.run();
-  ASSERT_LE(found.changes.size(), 1u);  // a second one of the same event is not told beside it
+  ASSERT_LE(found.changes.size(), 1u);  // a second one of the same event is not reported beside it
   if (found.changes.size() == 1) {
     EXPECT_GT(scan.all_gain(found.changes[0].shape, {}), 1.25 * found.changes[0].gain);
   } else {
@@ -134,7 +134,7 @@ TEST(RigScan, OfTheWholeRecordIsNoChangeButADifference) {
 }
 
 /// 0.1 of 400 healthy records is 40; the bound of the threshold is the sum over effects and shapes, which are
-/// told together: not more, but for four standard deviations of the count.
+/// reported together: not more, but for four standard deviations of the count.
 TEST(RigScan, FalseAlarmsAreThoseThatAreAllowed) {
   const ChangeSettings settings;
   const HealthyRig healthy = rig();

@@ -53,7 +53,7 @@ TEST(LoudStretch, OfAllOfTheRecordIsFromItsBeginning) {
   EXPECT_TRUE(found->to_end);
 }
 
-TEST(LoudStretch, IsToldThoughWhatIsFittedSpreadsIt) {
+TEST(LoudStretch, IsFoundThoughWhatIsFittedSpreadsIt) {
   // Least squares of what may drift leave a fiftieth of a loud end before it.
   const auto found = stretch_of(4, [](double t) { return t < 120 ? 20 : 1000; });
   ASSERT_TRUE(found);
@@ -90,7 +90,7 @@ TEST(LouderStretch, HealthyNoiseHasNone) {
   for (unsigned seed = 1; seed <= 20; ++seed) EXPECT_FALSE(louder_of(seed, [](double) { return 1; }));
 }
 
-TEST(LouderStretch, IsToldFarBelowALoudOne) {
+TEST(LouderStretch, IsFoundFarBelowALoudOne) {
   const auto found = louder_of(2, [](double t) { return t > 150 && t < 260 ? 2 : 1; });
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->from, 150, 4);  // a window

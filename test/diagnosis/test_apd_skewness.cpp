@@ -213,7 +213,7 @@ TEST(EstimateApdSkewness, OfASinglePeriodAllNoiseThatItMayHoldCounts) {
   EXPECT_EQ(e.lower, silent.lower);
   const double noise = signal::with_standard_error(apd.noise_range, 100).upper;
   EXPECT_NEAR(e.upper - silent.upper, 100 * noise / -test::kCurveSlope, 1e-12);  // 1 per 0.01 N m
-  recipe.noise = 0.02;  // more than the curve covers, and nothing tells it from ringing
+  recipe.noise = 0.02;  // more than the curve covers, and nothing distinguishes it from ringing
   const Estimate noisy = estimate(make_record(recipe), linear_curve());
   EXPECT_EQ(noisy.status, Status::insufficient_data);
   EXPECT_NE(noisy.message.find("noise"), std::string::npos) << noisy.message;

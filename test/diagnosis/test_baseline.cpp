@@ -93,7 +93,7 @@ TEST(Baseline, WhatIsNoBaselineIsRefusedWithItsKey) {
     }
 }
 
-TEST(Baseline, OfAnotherRigIsRefusedOfAnotherVersionTold) {
+TEST(Baseline, OfAnotherRigIsRefusedOfAnotherVersionReported) {
   const Baseline b = parse(kText);
   EXPECT_EQ(check_baseline(b, "sarkar \"a\"", "0123456789abcdef", "h.yaml"), "");
   EXPECT_NE(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is told of looks whose findings the test writes down.
+// What is reported of looks whose findings the test writes down.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -37,21 +37,21 @@ ChangeLook look(double to, std::vector<FoundChange> changes, std::vector<std::st
   return l;
 }
 
-TEST(ChangeLedger, TellsAChangeOnceAndWhenASecondLookFindsIt) {
+TEST(ChangeLedger, ReportsAChangeOnceAndWhenASecondLookFindsIt) {
   ChangeLedger ledger;
   EXPECT_TRUE(ledger.take(look(1000, {coulomb(950, 0.6)})).empty());
-  EXPECT_TRUE(ledger.told().empty());
+  EXPECT_TRUE(ledger.reported().empty());
   EXPECT_EQ(ledger.take(look(1060, {coulomb(950.5, 0.6)})), std::vector<long>{1});
   EXPECT_TRUE(ledger.take(look(1120, {coulomb(950, 0.6)})).empty());
-  ASSERT_EQ(ledger.told().size(), 1u);
-  EXPECT_EQ(ledger.told().front().state, ChangeState::standing);
+  ASSERT_EQ(ledger.reported().size(), 1u);
+  EXPECT_EQ(ledger.reported().front().state, ChangeState::standing);
   // It leaves the stretch and still stands.
   for (int to = 1300; to < 5000; to += 60) EXPECT_TRUE(ledger.take(look(to, {}, {"motor_coulomb"})).empty());
-  EXPECT_EQ(ledger.told().front().state, ChangeState::standing);
+  EXPECT_EQ(ledger.reported().front().state, ChangeState::standing);
   EXPECT_TRUE(ledger.unexplained_difference().empty());
 }
 
-TEST(ChangeLedger, TellsWhatBecomesSharper) {
+TEST(ChangeLedger, ReportsWhatBecomesSharper) {
   ChangeLedger ledger;
   ledger.take(look(1000, {coulomb(950, 0.6, 0.05)}));
   ledger.take(look(1060, {coulomb(950, 0.6, 0.05)}));
@@ -63,7 +63,7 @@ TEST(ChangeLedger, TellsWhatBecomesSharper) {
   renamed.effect = "load_dependent_friction";
   renamed.gain = 4000;
   EXPECT_EQ(ledger.take(look(1180, {renamed})), std::vector<long>{1});
-  EXPECT_EQ(ledger.told().size(), 1u);
+  EXPECT_EQ(ledger.reported().size(), 1u);
   EXPECT_EQ(ledger.change(1).found.effect, "load_dependent_friction");
 }
 
@@ -72,7 +72,7 @@ TEST(ChangeLedger, ForgetsWhatOnlyOneLookFound) {
   ledger.take(look(1000, {coulomb(950, 0.6)}));
   ledger.take(look(1060, {}));
   EXPECT_TRUE(ledger.take(look(1120, {coulomb(950, 0.6)})).empty());
-  EXPECT_TRUE(ledger.told().empty());
+  EXPECT_TRUE(ledger.reported().empty());
   ledger.restart();  // the clock was set between two looks
   EXPECT_TRUE(ledger.take(look(1180, {coulomb(950, 0.6)})).empty());
 }
@@ -93,19 +93,19 @@ TEST(ChangeLedger, EndsAChangeThatIsUndone) {
   ledger.take(look(1060, {coulomb(950, 0.6)}));
   ledger.take(look(3000, {coulomb(2900, -0.61)}, {"motor_coulomb"}));
   EXPECT_EQ(ledger.take(look(3060, {coulomb(2900, -0.61)}, {"motor_coulomb"})), std::vector<long>{1});
-  ASSERT_EQ(ledger.told().size(), 1u);  // the end is no change of its own
-  EXPECT_EQ(ledger.told().front().state, ChangeState::ended);
-  EXPECT_EQ(ledger.told().front().found.until, kStart + 2900);
+  ASSERT_EQ(ledger.reported().size(), 1u);  // the end is no change of its own
+  EXPECT_EQ(ledger.reported().front().state, ChangeState::ended);
+  EXPECT_EQ(ledger.reported().front().found.until, kStart + 2900);
   // Half of it gone is another change.
   ledger.take(look(9000, {coulomb(8950, 0.6)}));
   ledger.take(look(9060, {coulomb(8950, 0.6)}));
   ledger.take(look(12000, {coulomb(11950, -0.3)}));
   ledger.take(look(12060, {coulomb(11950, -0.3)}));
-  EXPECT_EQ(ledger.told().size(), 3u);
+  EXPECT_EQ(ledger.reported().size(), 3u);
 }
 
 // One look sees onset and end; later ones, from which the onset has gone, see the end as a change.
-TEST(ChangeLedger, TheEndThatWasToldIsNoFurtherChange) {
+TEST(ChangeLedger, TheEndThatWasReportedIsNoFurtherChange) {
   ChangeLedger ledger;
   FoundChange ended = coulomb(950, 0.6);
   ended.until = kStart + 1030;
@@ -114,8 +114,8 @@ TEST(ChangeLedger, TheEndThatWasToldIsNoFurtherChange) {
   EXPECT_EQ(ledger.take(look(1100, {ended})), std::vector<long>{1});
   for (int to = 1260; to < 1330; to += 30)
     EXPECT_TRUE(ledger.take(look(to, {coulomb(1031, -0.6)}, {"motor_coulomb"})).empty());
-  ASSERT_EQ(ledger.told().size(), 1u);
-  EXPECT_EQ(ledger.told().front().state, ChangeState::ended);
+  ASSERT_EQ(ledger.reported().size(), 1u);
+  EXPECT_EQ(ledger.reported().front().state, ChangeState::ended);
   // What falls further than to where it was begins another change.
   ledger.take(look(5000, {coulomb(4950, -0.6)}));
   EXPECT_EQ(ledger.take(look(5060, {coulomb(4950, -0.6)})), std::vector<long>{2});
@@ -180,8 +180,8 @@ TEST(ChangeLedger, EndsASineOfOppositePhase) {
   ledger.take(look(1060, {sine(950, 3)}));
   ledger.take(look(3000, {sine(2900, 3 - M_PI)}));
   ledger.take(look(3060, {sine(2900, 3 - M_PI)}));
-  ASSERT_EQ(ledger.told().size(), 1u);
-  EXPECT_EQ(ledger.told().front().state, ChangeState::ended);
+  ASSERT_EQ(ledger.reported().size(), 1u);
+  EXPECT_EQ(ledger.reported().front().state, ChangeState::ended);
 }
 
 TEST(ChangeLedger, SaysThatTheMachineIsAnotherSinceAnUnknownTime) {

@@ -59,7 +59,7 @@ TEST(Diagnose, TheVerdictUsesLimitsAndBaseline) {
 }
 
 /// A square wave of 0.05 N m that swings a joint by a radian, though the file says that it is locked.
-TEST(Diagnose, ALockThatMovesIsToldNotMeasured) {
+TEST(Diagnose, ALockThatMovesIsReportedNotMeasured) {
   DiagnosisSettings settings = all_settings();
   settings.position_difference.emplace();
   settings.position_difference->elastic_deflection = [](double torque) { return torque / 30; };

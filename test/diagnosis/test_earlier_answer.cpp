@@ -42,8 +42,8 @@ PeriodWindow ended(double when) {
   return window;
 }
 
-/// What is told at 102.5 s, or when said.
-Diagnosis told(const EarlierAnswer& found, const std::vector<Estimate>& now, double when = 102.5) {
+/// What is reported at 102.5 s, or at `when`.
+Diagnosis answer(const EarlierAnswer& found, const std::vector<Estimate>& now, double when = 102.5) {
   Diagnosis diagnosis;
   diagnosis.estimates = now;
   diagnosis.estimates.push_back(made("waveform", 0, 0, Status::insufficient_data));
@@ -55,8 +55,8 @@ bool counts(const Diagnosis& d) {
   return d.estimates.back().status == Status::ok;
 }
 
-TEST(EarlierAnswer, CountsWithItsAgeTold) {
-  const Diagnosis d = told(earlier({made("lost_motion", 79e-6, 5e-6)}), {made("lost_motion", 82e-6, 5e-6)});
+TEST(EarlierAnswer, CountsWithItsAgeReported) {
+  const Diagnosis d = answer(earlier({made("lost_motion", 79e-6, 5e-6)}), {made("lost_motion", 82e-6, 5e-6)});
   const Estimate& e = d.estimates.back();
   EXPECT_EQ(e.status, Status::ok);
   EXPECT_DOUBLE_EQ(e.age, 2.5);
@@ -68,33 +68,33 @@ TEST(EarlierAnswer, CountsWithItsAgeTold) {
 
 // 79 -> 95 um with 5 um of scatter in each: the machine changed. With wide intervals of declared values, too.
 TEST(EarlierAnswer, AMovedMethodShowsAChange) {
-  EXPECT_FALSE(counts(told(earlier({made("a", 79e-6, 5e-6)}), {made("a", 95e-6, 5e-6)})));
-  EXPECT_TRUE(counts(told(earlier({made("a", 79e-6, 9e-6)}), {made("a", 95e-6, 9e-6)})));
+  EXPECT_FALSE(counts(answer(earlier({made("a", 79e-6, 5e-6)}), {made("a", 95e-6, 5e-6)})));
+  EXPECT_TRUE(counts(answer(earlier({made("a", 79e-6, 9e-6)}), {made("a", 95e-6, 9e-6)})));
   Estimate then = made("a", 79e-6, 25e-6), now = made("a", 95e-6, 25e-6);
-  EXPECT_TRUE(counts(told(earlier({then}), {now})));
+  EXPECT_TRUE(counts(answer(earlier({then}), {now})));
   then.declared = now.declared = 24.9e-6 * kToAngle;
-  const Diagnosis changed = told(earlier({then}), {now});
+  const Diagnosis changed = answer(earlier({then}), {now});
   EXPECT_FALSE(counts(changed));
   EXPECT_NE(changed.estimates.back().message.find("changed since the last answer, by a"), std::string::npos);
   EXPECT_EQ(changed.verdict.members, std::vector<int>{0});
   // A fiftieth of the value is no change, however sharp a method is.
-  EXPECT_TRUE(counts(told(earlier({made("a", 80e-6, 1e-8)}), {made("a", 81e-6, 1e-8)})));
+  EXPECT_TRUE(counts(answer(earlier({made("a", 80e-6, 1e-8)}), {made("a", 81e-6, 1e-8)})));
 }
 
 TEST(EarlierAnswer, AContradictionCountsWhereThereWasNone) {
   const Estimate mute = made("a", 0, 0, Status::ambiguous), far = made("a", 150e-6, 20e-6);
-  EXPECT_FALSE(counts(told(earlier({mute}), {far})));
-  EXPECT_TRUE(counts(told(earlier({far}), {far})));  // as it was: combine() settles it
+  EXPECT_FALSE(counts(answer(earlier({mute}), {far})));
+  EXPECT_TRUE(counts(answer(earlier({far}), {far})));  // as it was: combine() settles it
   Estimate bound = made("a", 0, 0, Status::ok);
   bound.status = Status::above_range;
   bound.backlash_angle = bound.angle_upper = kNaN;
   bound.angle_lower = kToAngle * 120e-6;
-  EXPECT_FALSE(counts(told(earlier({mute}), {bound})));
+  EXPECT_FALSE(counts(answer(earlier({mute}), {bound})));
 }
 
 TEST(EarlierAnswer, NeitherTooOldNorWithoutTheLock) {
-  EXPECT_TRUE(counts(told(earlier({}), {}, 399)));
-  EXPECT_FALSE(counts(told(earlier({}), {}, 401)));
+  EXPECT_TRUE(counts(answer(earlier({}), {}, 399)));
+  EXPECT_FALSE(counts(answer(earlier({}), {}, 401)));
   Diagnosis diagnosis;
   diagnosis.lock_contradicted = "the output turns";
   diagnosis.estimates = {made("waveform", 0, 0, Status::insufficient_data)};
@@ -105,7 +105,7 @@ TEST(EarlierAnswer, NeitherTooOldNorWithoutTheLock) {
 
 // A fit that ended after the samples that are diagnosed now: what waits in a queue.
 TEST(EarlierAnswer, NoAgeBelowZero) {
-  EXPECT_EQ(told(earlier({}), {}, 99).estimates.back().age, 0);
+  EXPECT_EQ(answer(earlier({}), {}, 99).estimates.back().age, 0);
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ void expect_gap(const Servo& servo, const Estimate& e, double within = 0.1) {
   EXPECT_NEAR(e.backlash_angle, servo.gap, within * servo.gap) << e.message;
 }
 
-TEST(GapTraverse, TellsThePlayOfOrdinaryMotionFromTheMotorsSide) {
+TEST(GapTraverse, EstimatesThePlayOfOrdinaryMotionFromTheMotorsSide) {
   for (const double gap : {1.5e-4, 5e-4, 1.5e-3}) {
     Servo servo;
     servo.gap = gap;
@@ -110,7 +110,7 @@ TEST(GapTraverse, LostSamplesAreMissingRows) {
 }
 
 // The load's encoder is set at any angle, eccentric and late; the torque is not asked for.
-TEST(GapTraverse, TellsThePlayFromBothEncoders) {
+TEST(GapTraverse, EstimatesThePlayFromBothEncoders) {
   for (const double gap : {3e-4, 5e-4, 1.5e-3})
     for (const double eccentricity : {0.0, 2e-4}) {
       Servo servo;
@@ -173,7 +173,7 @@ TEST(GapTraverse, HoldsInSmoothMotionWithMoreFrictionThanDeclared) {
   expect_gap(servo, estimate_gap_traverse(servo.record(), declared()));
 }
 
-TEST(GapTraverse, NoPlayIsNotToldAsSome) {
+TEST(GapTraverse, NoPlayIsNotReportedAsSome) {
   for (const double gap : {0.0, 1e-5})
     for (const double step : {8.7e-7, 1.4e-5}) {  // 12 bits behind 110 : 1
       Servo servo;

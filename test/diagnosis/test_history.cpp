@@ -4,14 +4,10 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -21,6 +17,7 @@
 #include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/diagnosis/history.h"
+#include "history_test.h"
 
 namespace {
 
@@ -36,35 +33,6 @@ extern "C" int fsync(int descriptor) {
 
 namespace backlash::diagnosis {
 namespace {
-
-namespace fs = std::filesystem;
-
-HistoryEntry entry(int number) {
-  HistoryEntry e;
-  e.time = 1.8e9 + 0.1 * number;
-  e.grade = "good";
-  e.backlash = 1e-4 / 3 + 1e-9 * number;
-  e.lower = 0.9 * e.backlash;
-  e.upper = 1.1 * e.backlash;
-  e.methods = "apd_shape+lost_motion";
-  e.rig_digest = "0123456789abcdef";
-  return e;
-}
-
-bool same(double a, double b) {
-  return a == b || (std::isnan(a) && std::isnan(b));
-}
-
-void expect_same(const HistoryEntry& a, const HistoryEntry& b) {
-  EXPECT_EQ(a.event, b.event);
-  EXPECT_EQ(a.grade, b.grade);
-  EXPECT_EQ(a.methods, b.methods);
-  EXPECT_EQ(a.rig_digest, b.rig_digest);
-  for (const auto number : {&HistoryEntry::time, &HistoryEntry::backlash, &HistoryEntry::lower,
-                            &HistoryEntry::upper, &HistoryEntry::backlash_angle, &HistoryEntry::angle_lower,
-                            &HistoryEntry::angle_upper, &HistoryEntry::skewness})
-    EXPECT_TRUE(same(a.*number, b.*number)) << a.*number << " " << b.*number;
-}
 
 /// A lower limit for the size of files, as a full disk sets one.
 class FullDisk {
@@ -84,45 +52,6 @@ class FullDisk {
  private:
   struct rlimit before_ {};
   void (*handler_)(int);
-};
-
-class HistoryTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "backlash_history_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name = "elbow.csv") const { return (folder_ / name).string(); }
-  History history(std::uintmax_t rotate_at = 10'000'000) const { return History({path(), rotate_at}); }
-
-  std::string content(const std::string& name = "elbow.csv") const {
-    std::ifstream in(path(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
-  void put(const std::string& text) const { std::ofstream(path(), std::ios::binary) << text; }
-
-  /// The entries are those of these numbers, in this order.
-  void expect_entries(const std::vector<int>& numbers, std::size_t warnings = 0) const {
-    const HistoryFile file = read_history(path());
-    ASSERT_EQ(file.entries.size(), numbers.size());
-    for (std::size_t i = 0; i < numbers.size(); ++i) expect_same(file.entries[i], entry(numbers[i]));
-    EXPECT_EQ(file.warnings.size(), warnings);
-  }
-
-  template <typename E, typename F>
-  static void expect_refusal(F action, const std::string& reason) {
-    try {
-      action();
-      ADD_FAILURE() << "not refused: " << reason;
-    } catch (const E& error) {
-      EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
-    }
-  }
-
-  fs::path folder_;
 };
 
 class FsyncSeen {
@@ -399,59 +328,6 @@ TEST_F(HistoryTest, BehindALinkTheFileItselfIsRotated) {
   EXPECT_TRUE(fs::is_symlink(path()));
   EXPECT_TRUE(fs::exists(path("real/elbow.csv.1")));
   EXPECT_EQ(read_history(path("real/elbow.csv")).entries.size(), 4u);
-}
-
-/// Appends entries from `first` on, telling each number once append has returned, until it is killed.
-[[noreturn]] void write_on(const std::string& path, int first, int pipe) {
-  try {
-    History history({path, 2000});
-    for (int i = first;; ++i) {
-      history.append(entry(i));
-      if (::write(pipe, &i, sizeof i) != sizeof i) ::_exit(1);
-    }
-  } catch (...) {
-    ::_exit(2);
-  }
-}
-
-TEST_F(HistoryTest, NoKillCostsAnEntryThatWasWritten) {
-  Random random(7);
-  int next = 0;
-  std::vector<int> told;
-  for (int round = 0; round < 40; ++round) {
-    int ends[2];
-    ASSERT_EQ(::pipe(ends), 0);
-    const pid_t child = ::fork();
-    ASSERT_GE(child, 0);
-    if (child == 0) write_on(path(), next, ends[1]);
-    ::close(ends[1]);
-    const int until = static_cast<int>(random.below(25));  // as many are waited for, then it may die anywhere
-    int number = 0;
-    for (int i = 0; i < until; ++i) {
-      ASSERT_EQ(::read(ends[0], &number, sizeof number), static_cast<ssize_t>(sizeof number));
-      told.push_back(number);
-    }
-    ::usleep(random.below(3000));
-    ::kill(child, SIGKILL);
-    int status = 0;
-    ASSERT_EQ(::waitpid(child, &status, 0), child);
-    ASSERT_TRUE(WIFSIGNALED(status)) << WEXITSTATUS(status);
-    while (::read(ends[0], &number, sizeof number) == static_cast<ssize_t>(sizeof number))
-      told.push_back(number);
-    ::close(ends[0]);
-    // The entry under way when it died may be there or not; its number is not used again.
-    next = told.empty() ? next + 1 : std::max(next, told.back() + 2);
-  }
-  history();
-  std::vector<int> found;
-  for (const HistoryEntry& e : read_history(path()).entries) {
-    found.push_back(static_cast<int>(std::lround((e.time - 1.8e9) / 0.1)));
-    expect_same(e, entry(found.back()));
-  }
-  EXPECT_GT(told.size(), 200u);
-  EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
-  EXPECT_TRUE(std::includes(found.begin(), found.end(), told.begin(), told.end()));
-  EXPECT_LE(found.size(), told.size() + 40);
 }
 
 }  // namespace

@@ -3,107 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <string>
 #include <vector>
 
-#include "../support/data.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/lost_motion.h"
-#include "backlash_diagnosis/record/csv.h"
+#include "locked_motor.h"
 
 namespace backlash::diagnosis {
 namespace {
 
-const double kPi = std::acos(-1.0);
-
-// Motor behind a locked output, quasi-static: gap g, compliance c on the flanks, Coulomb friction Fc at the
-// motor. It rests while abs(u - f(x)) <= Fc and else follows u -+ Fc along the flank characteristic.
-struct Machine {
-  double gap = 0.02, compliance = 1e-3, coulomb = 0.5;
-  double position = 0;
-
-  double held(double x) const {
-    return std::abs(x) <= gap / 2 ? 0 : (x - std::copysign(gap / 2, x)) / compliance;
-  }
-  double step(double torque) {
-    if (torque - coulomb > held(position)) position = flank(torque - coulomb);
-    if (torque + coulomb < held(position)) position = flank(torque + coulomb);
-    return position;
-  }
-  double flank(double torque) const {
-    return torque == 0 ? position : std::copysign(gap / 2, torque) + compliance * torque;
-  }
-  // Closed form of the play at +-torque on the unloading branch after a peak: friction holds the motor there
-  // until torque has fallen by 2 Fc.
-  double play(double torque, double peak) const {
-    return gap + 2 * compliance * std::min(peak - coulomb, torque + coulomb);
-  }
-};
-
-enum class Wave { triangle, sine, square };
-
-double wave(Wave shape, double phase) {
-  phase -= std::floor(phase);
-  if (shape == Wave::sine) return std::sin(2 * kPi * phase);
-  if (shape == Wave::square) return phase < 0.5 ? 1 : -1;
-  return phase < 0.25 ? 4 * phase : phase < 0.75 ? 2 - 4 * phase : 4 * phase - 4;
-}
-
-struct Experiment {
-  Wave shape = Wave::triangle;
-  double amplitude = 4, frequency = 0.25, duration = 20, rate = 400;
-  double torque_noise = 0, position_noise = 0, offset = 0, drift = 0;
-  std::vector<std::pair<double, double>> slips;  // s, rad: from this half period on until the next
-  unsigned seed = 1;
-};
-
-record::Record run(Machine machine, const Experiment& e) {
-  record::Record record;
-  Random generator(e.seed);
-  const auto samples = static_cast<std::size_t>(e.duration * e.rate);
-  for (std::size_t i = 0; i < samples; ++i) {
-    const double time = static_cast<double>(i) / e.rate;
-    const double torque = e.amplitude * wave(e.shape, time * e.frequency);
-    double position =
-        machine.step(torque) + e.offset + e.drift * time + e.position_noise * generator.normal();
-    for (const auto& [from, size] : e.slips) {
-      if (time >= from && time < from + 0.5 / e.frequency) position += size;
-    }
-    record.time.push_back(time);
-    record.column(record::Channel::motor_torque).push_back(torque + e.torque_noise * generator.normal());
-    record.column(record::Channel::motor_position).push_back(position);
-  }
-  return record;
-}
-
-LostMotionSettings at(double torque) {
-  LostMotionSettings settings;
-  settings.torque = torque;
-  return settings;
-}
-
-LostMotionSettings without_deflection(double torque, double compliance) {
-  LostMotionSettings settings = at(torque);
-  settings.subtract_elastic_deflection = true;
-  settings.elastic_deflection = [compliance](double u) { return compliance * u; };
-  return settings;
-}
-
-void expect_contains(const Estimate& estimate, double truth) {
-  EXPECT_EQ(estimate.status, Status::ok) << estimate.message;
-  EXPECT_LE(estimate.angle_lower, truth);
-  EXPECT_GE(estimate.angle_upper, truth);
-}
-
-void expect_refusal(const Estimate& estimate, Status status, const std::string& words) {
-  EXPECT_EQ(estimate.status, status) << estimate.message;
-  EXPECT_NE(estimate.message.find(words), std::string::npos) << estimate.message;
-  EXPECT_TRUE(std::isnan(estimate.backlash_angle));
-  EXPECT_TRUE(std::isnan(estimate.angle_lower));
-  EXPECT_FALSE(estimate.components);
-}
+using namespace locked_motor;
 
 TEST(LostMotionRamp, PlayAtTheStatedTorqueIsTheClosedForm) {
   for (const double coulomb : {0.1, 0.5, 1.5}) {
@@ -288,7 +199,7 @@ record::Record settling_record(double wall, double creep, double ring, double ta
     record.time.push_back(time);
     record.column(record::Channel::motor_torque).push_back(side);
     record.column(record::Channel::motor_position)
-        .push_back(side * (wall - creep * decay + ring * decay * std::cos(2 * kPi * 150 * since)));
+        .push_back(side * (wall - creep * decay + ring * decay * std::cos(2 * M_PI * 150 * since)));
   }
   return record;
 }
@@ -311,7 +222,7 @@ TEST(LostMotionRamp, RippleOfThePositionIsInTheInterval) {
   const double ripple = 2e-4;
   record::Record record = run({}, {});
   for (std::size_t i = 0; i < record.size(); ++i) {
-    record.column(record::Channel::motor_position)[i] += ripple * std::sin(2 * kPi * 30 * record.time[i]);
+    record.column(record::Channel::motor_position)[i] += ripple * std::sin(2 * M_PI * 30 * record.time[i]);
   }
   const Estimate estimate = estimate_lost_motion(record, at(3));
   expect_contains(estimate, Machine().play(3, 4));
@@ -333,7 +244,7 @@ TEST(LostMotionFree, UnequalHoldsAreInTheInterval) {
     record.time.push_back(time);
     record.column(record::Channel::motor_torque).push_back(side);
     record.column(record::Channel::motor_position)
-        .push_back(side * (wall - ring * std::exp(-since / tau) * std::cos(2 * kPi * 45 * since)));
+        .push_back(side * (wall - ring * std::exp(-since / tau) * std::cos(2 * M_PI * 45 * since)));
   }
   expect_contains(estimate_lost_motion(record, without_deflection(1, 1e-3)), 2 * wall - 2e-3);
 }
@@ -488,50 +399,6 @@ TEST(LostMotionStatus, SettingsOutOfRangeThrow) {
   settings = at(3);
   settings.locked_tolerance = 0;
   EXPECT_THROW(estimate_lost_motion(record, settings), InvalidParameter);
-}
-
-TEST(LostMotionMeasured, CycloidalGearboxKeepsOrderAndReference) {
-  // Play at +-3.5 N m [deg] as read off the plots of these records.
-  const std::vector<std::pair<std::string, double>> reference = {
-      {"split_preload3", 0.28}, {"split_preload1", 1.10}, {"split_reassembled", 1.74}};
-  double previous = 0;
-  for (const auto& [name, degrees] : reference) {
-    const auto path = test::find_data("measured/cycloidal_" + name + "_play.csv");
-    if (!path) GTEST_SKIP() << "measured record of " << name << " is absent";
-    const Estimate estimate = estimate_lost_motion(record::read_csv(*path), at(3.5));
-    // Reading precision of the plots and the slips of a degree in single ramps: 0.05 deg.
-    EXPECT_NEAR(estimate.backlash_angle * 180 / kPi, degrees, 0.05) << name << ": " << estimate.message;
-    expect_contains(estimate, degrees * kPi / 180);
-    EXPECT_GT(estimate.angle_lower, previous) << name;
-    previous = estimate.angle_upper;
-    ASSERT_TRUE(estimate.components);
-    // Half the width of the loop lies between 1 and 3 N m in every one of these plots.
-    EXPECT_GT(estimate.components->coulomb, 1) << name;
-    EXPECT_LT(estimate.components->coulomb, 3) << name;
-    EXPECT_LT(estimate.components->gap, estimate.backlash_angle) << name;
-  }
-}
-
-TEST(LostMotionMeasured, RigWithKnownHalfGapWithinThreeMicrometres) {
-  // Series of input sensor, Hertzian contact and output coupling of the rig that made the records.
-  const double radius = 0.014917;
-  LostMotionSettings settings = at(0.05);
-  settings.subtract_elastic_deflection = true;
-  settings.base_radius = radius;
-  settings.elastic_uncertainty = 0.02;  // as config/sarkar_1997.yaml
-  settings.elastic_deflection = [radius](double torque) {
-    return torque / 28.71 + std::pow(torque / radius / 2.28e8, 2.0 / 3) / radius + torque / 6310;
-  };
-  for (const int half_gap : {0, 30, 55, 80}) {
-    const auto path = test::find_data("rig/rig_halfgap_" + std::to_string(half_gap) + "um.csv");
-    if (!path) GTEST_SKIP() << "rig record with half gap " << half_gap << " um is absent";
-    const Estimate estimate = estimate_lost_motion(record::read_csv(*path), settings);
-    const double truth = 2e-6 * half_gap;
-    EXPECT_NEAR(estimate.backlash, truth, 3e-6) << estimate.message;  // demanded of the method
-    EXPECT_LE(estimate.lower, truth);
-    EXPECT_GE(estimate.upper, truth);
-    EXPECT_LT(estimate.upper - estimate.lower, 1e-5);  // an interval that still tells 25 um steps apart
-  }
 }
 
 }  // namespace

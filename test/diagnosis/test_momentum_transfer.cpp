@@ -83,7 +83,7 @@ TEST(MomentumTransfer, DryFrictionOfTheMotorIsNoTorqueOfTheTeeth) {
 }
 
 // Of a free load the friction is that which leaves nothing in flight, not the declared one.
-TEST(MomentumTransfer, DryFrictionIsToldInFlightWhereTheLoadIsFree) {
+TEST(MomentumTransfer, DryFrictionIsEstimatedInFlightWhereTheLoadIsFree) {
   constexpr double kGap = 1e-2, kFriction = 0.5;
   record::Record record = crossing(kGap);
   for (std::size_t i = 0; i < record.size(); ++i) {
@@ -103,8 +103,8 @@ TEST(MomentumTransfer, DryFrictionIsToldInFlightWhereTheLoadIsFree) {
   }
 }
 
-// Nothing is told of a free load whose flanks, as declared, may yield by as much as was travelled.
-TEST(MomentumTransfer, OfAFreeLoadNoPlayIsNotTold) {
+// No play is reported of a free load whose flanks, as declared, may yield by as much as was travelled.
+TEST(MomentumTransfer, OfAFreeLoadNoPlayIsNotReported) {
   constexpr double kGap = 1e-2;
   record::Record record = crossing(kGap);
   record.column(record::Channel::load_position).assign(record.size(), 0.0);
@@ -149,11 +149,11 @@ TEST(MomentumTransfer, TravelOfAFreeFlightWithoutATorque) {
         EXPECT_GE(e.angle_upper, 0.98 * gap) << tachometer << ' ' << gap;
         // Two samples of the speed at the impact.
         EXPECT_NEAR(e.backlash_angle, gap, 2 * std::sqrt(2 * kTorque * gap / kInertia) / kRate);
-        EXPECT_NE(e.message.find("told from the motion"), std::string::npos) << e.message;
+        EXPECT_NE(e.message.find("estimated from the motion"), std::string::npos) << e.message;
       }
 }
 
-TEST(MomentumTransfer, WithoutATorqueOnlyASquareWaveIsTold) {
+TEST(MomentumTransfer, WithoutATorqueOnlyASquareWaveIsEstimated) {
   record::Record sine = crossing(0.01);  // a motor that swings freely
   sine.column(record::Channel::motor_torque).clear();
   record::Record still = sine, random = sine;
@@ -223,7 +223,7 @@ TEST(MomentumTransfer, RefusesWhatItCannotSee) {
   EXPECT_EQ(estimate_momentum_transfer(crossing(0.01), s).status, Status::out_of_domain);
 }
 
-// Averages of up to 3.4 ms blur flights of 1 and 2 ms: the play may be told, but not to a hundredth.
+// Averages of up to 3.4 ms blur flights of 1 and 2 ms: the play may be estimated, but not to a hundredth.
 TEST(MomentumTransfer, NoiseMovesReleaseAndImpact) {
   for (const double gap : {5e-4, 1e-3, 2e-3})
     for (const double noise : {0.1, 0.2, 0.3, 0.5}) {  // N m, of 1

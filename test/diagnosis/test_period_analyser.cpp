@@ -20,7 +20,8 @@ std::vector<double> stamps(std::size_t count, double interval, double start = 0)
   return time;
 }
 
-/// All windows of a run; the value of a sample is its phase in the period, so that windows can be told apart.
+/// All windows of a run; the value of a sample is its phase in the period, so that windows can be
+/// distinguished.
 std::vector<PeriodResult> windows_of(const std::vector<double>& time, double period) {
   PeriodAnalyser analyser(period, kLayout);
   std::vector<PeriodResult> windows;
@@ -125,7 +126,7 @@ TEST(PeriodAnalyser, AGapSpoilsOnlyItsWindow) {
   }
 }
 
-TEST(PeriodAnalyser, AGapUnderFivePercentIsToldButAccepted) {
+TEST(PeriodAnalyser, AGapUnderFivePercentIsReportedButAccepted) {
   auto time = stamps(1000, 1e-3);
   time.erase(time.begin() + 310, time.begin() + 313);
   const auto windows = windows_of(time, 0.1);

@@ -63,7 +63,7 @@ TEST(PositionDifference, FreePlayOfAServoWhoseLoadMoves) {
 }
 
 // Noise of a regressor draws its coefficient towards 0, here the compliance, and the play follows: without
-// looking at the load's motion it is told 3 to 8 % wrong from these records. 1 % is declared to either side.
+// looking at the load's motion these records give it 3 to 8 % wrong. 1 % is declared to either side.
 TEST(PositionDifference, NoiseOfTheTorqueIsNoPlay) {
   for (const double gap : {2e-4, 5e-4})
     for (const double noise : {30.0, 60.0, 120.0}) {  // N m, of about 150
@@ -80,9 +80,9 @@ TEST(PositionDifference, NoiseOfTheTorqueIsNoPlay) {
 
 // A light load is dragged: each flank is pressed in one direction of motion only, and a larger play looks as
 // more dry friction of the motor does. With a load of 100 kg m^2, which drives where it is braked, the same
-// play is told. The reason is asked for: without that rule these records are refused as well, by one accident
-// or another; machines that were told a wrong play are those of diagnose_machines.sh --build light_load.
-TEST(PositionDifference, PlayOfALoadThatIsDraggedIsNotToldFromFriction) {
+// play is estimated. The reason is asked for: without that rule these records are refused as well, by one
+// accident or another; machines that got a wrong play are those of diagnose_machines.sh --build light_load.
+TEST(PositionDifference, PlayOfALoadThatIsDraggedLooksLikeFriction) {
   struct Load {
     double inertia, friction;  // kg m^2, N m: of the acceleration, 3.6 rad/s^2, less than of the friction
   };
@@ -101,9 +101,9 @@ TEST(PositionDifference, PlayOfALoadThatIsDraggedIsNotToldFromFriction) {
 }
 
 // To and fro over the same path each flank is pressed in a part of it of its own: what errors of the encoders
-// may be there is told from play by the few windows in between, and by a torque that is all right.
-TEST(PositionDifference, MovesOverTheSamePathTellNoWrongPlay) {
-  int told = 0, own_part = 0;
+// may be there is distinguished from play by the few windows in between, and by a torque that is all right.
+TEST(PositionDifference, MovesOverTheSamePathGiveNoWrongPlay) {
+  int answered = 0, own_part = 0;
   for (const double gap : {3e-4, 1e-3})
     for (const double there : {0.7, 1.0})
       for (const double saturates : {0.0, 600.0})
@@ -116,18 +116,18 @@ TEST(PositionDifference, MovesOverTheSamePathTellNoWrongPlay) {
           const Estimate e = estimate_position_difference(servo.record(), settings());
           own_part += e.message.find("part of the path") != std::string::npos;
           if (e.status != Status::ok) continue;
-          ++told;
+          ++answered;
           EXPECT_LE(e.angle_lower, gap) << there << " s: " << e.message;
           EXPECT_GE(e.angle_upper, gap) << there << " s: " << e.message;
         }
-  EXPECT_GT(told, 0);
+  EXPECT_GT(answered, 0);
   EXPECT_GT(own_part, 0);  // and says so
 }
 
-// Teeth of which one side is stiffer, under a weight that presses the other one most of the time, were told
-// as up to seven times the play, from the few windows on the one.
+// Teeth of which one side is stiffer, under a weight that presses the other one most of the time, were
+// reported as up to seven times the play, from the few windows on the one.
 TEST(PositionDifference, TeethWithOneStifferSideAreNoPlay) {
-  int told = 0;
+  int answered = 0;
   for (const double gap : {1e-4, 1e-3})
     for (const double weight : {0.0, 60.0, 100.0, 140.0})
       for (const double asymmetry : {-0.4, 0.3}) {
@@ -137,11 +137,11 @@ TEST(PositionDifference, TeethWithOneStifferSideAreNoPlay) {
         servo.asymmetry = asymmetry;
         const Estimate e = estimate_position_difference(servo.record(), settings());
         if (e.status != Status::ok) continue;
-        ++told;
+        ++answered;
         EXPECT_LE(e.angle_lower, gap) << weight << " N m, " << asymmetry << ": " << e.message;
         EXPECT_GE(e.angle_upper, gap) << weight << " N m, " << asymmetry << ": " << e.message;
       }
-  EXPECT_GT(told, 0);
+  EXPECT_GT(answered, 0);
 }
 
 // A drive that chatters throws the motor from flank to flank within a few samples. What windows of them
@@ -171,7 +171,7 @@ TEST(PositionDifference, MeansOfATorqueThatAlternatesAreNotThoseOfTheTeeth) {
 
 // Teeth that press harder the deeper they go: at 200 N m, 0.5 mrad, these are stiffer by a quarter, and by
 // all.
-TEST(PositionDifference, TeethThatHardenAreToldOrTheIntervalHoldsThem) {
+TEST(PositionDifference, TeethThatHardenAreEstimatedOrTheIntervalHoldsThem) {
   for (const double hardening : {1e6, 4e6})
     for (const double gap : {2e-4, 5e-4}) {
       Servo servo;
@@ -184,9 +184,9 @@ TEST(PositionDifference, TeethThatHardenAreToldOrTheIntervalHoldsThem) {
     }
 }
 
-// Hertz's teeth yield most where they begin to touch: with a spring in their place the play is told 1.5 to 3
-// times too large. 0.6, 0.74 and 0.87 are none of the powers that are tried.
-TEST(PositionDifference, TeethThatYieldByAPowerOfTheTorqueAreToldOrTheIntervalHoldsThem) {
+// Hertz's teeth yield most where they begin to touch: with a spring in their place the play is estimated 1.5
+// to 3 times too large. 0.6, 0.74 and 0.87 are none of the powers that are tried.
+TEST(PositionDifference, TeethThatYieldByAPowerOfTheTorqueAreEstimatedOrTheIntervalHoldsThem) {
   int answered = 0;
   for (const double power : {0.6, 2.0 / 3, 0.74, 0.87})
     for (const double gap : {2e-4, 5e-4})
@@ -215,7 +215,7 @@ record::Record with_output_torque(const Servo& servo, double sign) {
   return r;
 }
 
-TEST(PositionDifference, ATorqueSensorBehindTheGearTellsTheFlanksAsWell) {
+TEST(PositionDifference, ATorqueSensorBehindTheGearShowsTheFlanksAsWell) {
   for (const double gap : {0.0, 5e-4, 2e-3})
     for (const double sign : {1.0, -1.0}) {
       Servo servo;

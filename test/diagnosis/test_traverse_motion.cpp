@@ -54,7 +54,7 @@ TraverseRun some_run(const TraverseData& data, int which) {
 constexpr int kSmallSteps = 1000;  // per sample
 
 /// The equations of gap_traverse.h, run by run, by the library's pow(), in steps across touches: they are
-/// told to half a small step.
+/// known to half a small step.
 class Reference {
  public:
   Reference(const TraverseData& data, const TraverseRun& run)

@@ -73,7 +73,7 @@ TEST(Trend, SaysWhyThereIsNone) {
   none(same, "9 points at different times");
   for (TrendPoint& p : day) p.time = kStart + (p.time - kStart) / 20;
   none(day, "the points span 22.8 h, at least 24 h are needed");
-  const Trend flat = none(line(20, 0), "growth cannot be told from none: 0 um per year (95 %: 0 to 0)");
+  const Trend flat = none(line(20, 0), "growth is not distinguished from none: 0 um per year (95 %: 0 to 0)");
   EXPECT_TRUE(flat.known);
   EXPECT_EQ(flat.rate, 0);
 }
@@ -184,7 +184,7 @@ double scatter(double share, int trials) {
 }
 
 // Where the errors have no memory the intervals allow for one that cannot be excluded: they hold more often
-// than 95 %, growth is told by mistake less often than 2.5 %, but the interval must not become useless.
+// than 95 %, growth is reported by mistake less often than 2.5 %, but the interval must not become useless.
 TEST(Trend, IntervalsHoldForIndependentErrors) {
   constexpr int kTrials = 400;
   for (const int points : {10, 20, 60, 150}) {
@@ -207,7 +207,7 @@ TEST(Trend, IntervalsHoldForIndependentErrors) {
   EXPECT_LT(width, 1.6 * 1.36);
 }
 
-// How long errors remember is not told well by few points: up to 4 % less than promised is taken.
+// How long errors remember is not well known from few points: up to 4 % less than promised is taken.
 TEST(Trend, IntervalsHoldForErrorsThatHangTogether) {
   constexpr int kTrials = 300;
   std::vector<Histories> kinds(5);
@@ -239,7 +239,7 @@ TEST(Trend, UpToAFifthOfThePointsMayBeWrong) {
   EXPECT_GE(rates.dates, 0.95 - scatter(0.95, kTrials));
 }
 
-TEST(Trend, AMillionPointsTellTheSameAsFew) {
+TEST(Trend, AMillionPointsSayTheSameAsFew) {
   // A point per minute for two years, half a micrometre of growth a month, errors of 5 um that a day forgets.
   Random random(41);
   const double rate = 6e-6 / kYear, kept = std::exp(-60 / kDay);

@@ -258,7 +258,7 @@ def one(bench, generate, rng):
 
 
 def burst(bench, rng):
-    """As fast as rospy can, several runs one after another; the rate that was reached is told."""
+    """As fast as rospy can, several runs one after another; the rate that was reached is reported."""
     rounds = rng.choice([3, 10])
     publisher, diagnoser = bench.open()
     with diagnoser:

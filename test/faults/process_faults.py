@@ -356,7 +356,7 @@ def roscore_killed_and_restarted(bench, rng):
     """The nodes go on measuring without a master; a new one knows them again, with all that they had kept."""
     with bench.simulator() as simulator, bench.diagnoser() as diagnoser:
         bench.after_new_periods(BACKLASH)
-        time.sleep(2)  # nodes look what the master knows of them each second; before that they know nothing to tell
+        time.sleep(2)  # nodes look what the master knows of them each second; before that they know nothing to report
         begin = bench.call("diagnose", joint="", periods=1, timeout=5).distribution.header.stamp.to_sec()
         bench.master.kill()
         time.sleep(rng.choice([0.5, 5]))

@@ -44,7 +44,7 @@ class Master:
             return False
 
     def kill(self):
-        """As a crash: no node is told."""
+        """As a crash: no node is informed."""
         self._process.kill()
         self._process.wait()
 

@@ -231,7 +231,7 @@ def diagnosis_by_wrong_rig(rng, clean):
 
 
 def judged_by_angle(what):
-    """A record tells of angles; metres are those of the base radius that the rig file states."""
+    """A record holds angles; metres are those of the base radius that the rig file states."""
     return "base_radius" in what
 
 

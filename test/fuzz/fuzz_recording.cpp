@@ -22,8 +22,7 @@ void check(const record::Record& record) {
   for (std::size_t i = 1; i < record.size(); ++i)
     fuzz::require(record.time[i] > record.time[i - 1], "times that do not increase");
   for (const record::Channel channel : record::kChannels)
-    for (const double value : record.column(channel))
-      fuzz::require(std::isfinite(value), "a value that is not finite");
+    for (const double value : record.column(channel)) fuzz::require(!std::isinf(value), "an infinite value");
 }
 
 }  // namespace

@@ -103,13 +103,6 @@ def write_recordings(data, out):
     for name in sorted(os.listdir(data)):
         if name.endswith(".mcap"):
             shutil.copy(os.path.join(data, name), out)
-    for name in sorted(os.listdir(out)):  # what a full disk and a killed recorder leave
-        with open(os.path.join(out, name), "rb") as stream:
-            body = stream.read()
-        noise = bytes(random.Random(name).randrange(256) for _ in range(500))
-        cut = body[:len(body) * 7 // 10]
-        for kind, damaged in (("cut", cut), ("noise", cut + noise)):
-            write(out, kind + "_" + name, damaged)
     path = os.path.join(out, "run.db3")
     if os.path.exists(path):
         os.remove(path)
@@ -120,6 +113,13 @@ def write_recordings(data, out):
         db.execute("INSERT INTO topics VALUES(1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr')")
         db.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES(1, ?, ?)",
                        [(m.header.stamp.to_nsec(), cdr(m)) for m in joint_states()])
+    for name in sorted(os.listdir(out)):  # what a full disk and a killed recorder leave
+        with open(os.path.join(out, name), "rb") as stream:
+            body = stream.read()
+        noise = bytes(random.Random(name).randrange(256) for _ in range(500))
+        cut = body[:len(body) * 7 // 10]
+        for kind, damaged in (("cut", cut), ("noise", cut + noise)):
+            write(out, kind + "_" + name, damaged)
 
 
 def main(config, out):

@@ -169,7 +169,7 @@ TEST(MotionPlan, InformationIsThatOfTheSingularValues) {
     const Eigen::VectorXd size = all.colwise().norm().transpose().cwiseMax(1e-6);
     Singular rank(all * size.cwiseInverse().asDiagonal());
     rank.setThreshold(
-        1e-6);  // between 0.1, the least that these motions tell, and rounding of empty columns, 1e-8
+        1e-6);  // between 0.1, the least that these motions show, and rounding of empty columns, 1e-8
     EXPECT_EQ(Eigen::Index(information.parameters()), rank.rank()) << name;
     // Of links 6 where two turn in a plane; of six in space 7 n - 4, less 2 as the first axis is along
     // gravity (Gautier and Khalil 1990, IEEE T-RA 6:368); three per drive, but the rotor of the first joint,
@@ -188,12 +188,12 @@ TEST(MotionPlan, InformationIsThatOfTheSingularValues) {
     const Eigen::VectorXd s = Singular(base * length.cwiseInverse().asDiagonal()).singularValues();
     const MotionInformation found = information.of(motion, rate, 1);
     EXPECT_NEAR(found.condition, s[0] / s[s.size() - 1], 1e-6 * found.condition) << name;
-    // Scales of the columns are the same for any two motions: half of the noise tells more by log 2 per
+    // Scales of the columns are the same for any two motions: half of the noise adds log 2 per
     // parameter.
     for (double& each : noise) each /= 2;
     EXPECT_NEAR(BaseInformation(arm.rig, limits, noise, 1).of(motion, rate, 1).log_volume - found.log_volume,
                 double(base.cols()) * std::log(2.0), 1e-6);
-    // Every other row tells less by what the singular values say.
+    // Every other row has less, by what the singular values say.
     Eigen::MatrixXd even(base.rows() / 2, base.cols());
     for (Eigen::Index i = 0; i < rows / 2; ++i) even.middleRows(i * n, n) = base.middleRows(2 * i * n, n);
     const auto volume = [](const Eigen::MatrixXd& y) {
@@ -360,8 +360,8 @@ TEST_F(OneLink, TheTrajectoryEndsAtRest) {
   EXPECT_THROW(trajectory_csv(a, plan, 0), InvalidParameter);
 }
 
-/// The proof: a simulated arm that follows the motion tells its plays, the motion of its file does not.
-TEST(MotionPlan, TellsThePlaysThatTheMotionOfTheFileHides) {
+/// The proof: a simulated arm that follows the motion shows its plays, the motion of its file does not.
+TEST(MotionPlan, ShowsThePlaysThatTheMotionOfTheFileHides) {
   const GearedArm declared = arm_of("two_link_arm/two_link_arm_hidden");
   const MotionPlan plan = planned(declared, quick());
   ASSERT_TRUE(plan.none_hidden());
@@ -390,16 +390,16 @@ TEST(MotionPlan, TellsThePlaysThatTheMotionOfTheFileHides) {
     ASSERT_EQ(e.status, diagnosis::Status::ok) << e.message;
     EXPECT_LE(e.angle_lower, truth[j]);
     EXPECT_GE(e.angle_upper, truth[j]);
-    EXPECT_NEAR(e.backlash_angle, truth[j], 0.1 * truth[j]);  // the promise of doc/arm.md
+    EXPECT_NEAR(e.backlash_angle, truth[j], 0.1 * truth[j]);  // within 10 %, as in doc/evidence/arm.md
     // As many stays as were promised in each of the two periods, at least.
     EXPECT_GE(plays[j].stays[0], 2 * plan.joints[j].stays[0]);
     EXPECT_GE(plays[j].stays[1], 2 * plan.joints[j].stays[1]);
   }
 }
 
-/// Of six joints the one that gravity does not load is told as such, and its reason; the lift, which the
-/// motion of the file does not tell, is shown.
-TEST(MotionPlan, OfSixJointsItTellsWhichWillBeTold) {
+/// Of six joints the one that gravity does not load is reported as such, with its reason; the lift, which the
+/// motion of the file hides, is shown.
+TEST(MotionPlan, OfSixJointsItSaysWhichGapsAreShown) {
   const GearedArm declared = arm_of("ur10e_arm/ur10e_arm_geared");
   PlanSettings settings = quick();
   settings.steps = 1500;

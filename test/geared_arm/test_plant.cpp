@@ -228,7 +228,7 @@ TEST(GearedArm, FrictionFollowsTheTorqueOfTheTeeth) {
   EXPECT_NEAR(own, expected, 0.1 * expected);  // the controller's errors, the rotor's inertia
 }
 
-TEST(GearedArm, AGivenJointMovesAsToldAndTheOthersAsKdlSays) {
+TEST(GearedArm, AGivenJointMovesAsGivenAndTheOthersAsKdlSays) {
   Random random(5);
   for (int i = 0; i < 20; ++i) {
     const arm::Chain chain = test::random_chain(random, 5);
@@ -357,7 +357,7 @@ TEST(ArmSimulation, ShowsWhatTheFileDeclares) {
 TEST(ArmSimulation, EffectsThatItCannotMoveAreRefused) {
   const std::string folder = test::package_file("config/two_link_arm");
   const std::string text = read_start(folder + "/two_link_arm.yaml", 100000);
-  const auto told = [&](const std::string& effect, bool geared) {
+  const auto outcome = [&](const std::string& effect, bool geared) {
     std::string changed = text;
     const std::size_t place = changed.find("    gear:"), end = changed.find("    motion_limits", place);
     if (!geared) changed.erase(place, end - place);
@@ -370,13 +370,13 @@ TEST(ArmSimulation, EffectsThatItCannotMoveAreRefused) {
     return std::string("accepted");
   };
   const std::string load = "id: load_dependent_friction, coefficient: 0.1";
-  EXPECT_EQ(told(load, true), "accepted");
-  EXPECT_NE(told(load, false).find("needs a `gear`"), std::string::npos) << told(load, false);
-  EXPECT_EQ(told("id: motor_torque_gain, gain: 0.1", false), "accepted");
-  EXPECT_NE(
-      told("id: motor_torque_gain, gain: -0.6}, {id: motor_torque_gain, gain: -0.6", true).find("no torque"),
-      std::string::npos);
-  EXPECT_NE(told("id: presliding, torque: 1, distance: 0.01", true).find("presliding cannot be simulated"),
+  EXPECT_EQ(outcome(load, true), "accepted");
+  EXPECT_NE(outcome(load, false).find("needs a `gear`"), std::string::npos) << outcome(load, false);
+  EXPECT_EQ(outcome("id: motor_torque_gain, gain: 0.1", false), "accepted");
+  EXPECT_NE(outcome("id: motor_torque_gain, gain: -0.6}, {id: motor_torque_gain, gain: -0.6", true)
+                .find("no torque"),
+            std::string::npos);
+  EXPECT_NE(outcome("id: presliding, torque: 1, distance: 0.01", true).find("presliding cannot be simulated"),
             std::string::npos);
 }
 

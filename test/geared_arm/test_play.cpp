@@ -27,7 +27,7 @@ std::vector<JointPlay> diagnosed(const GearedArm& machine, const GearedArm& decl
                   arm::arm_record(simulate_arm(machine, duration), declared.rig, "simulated"), warnings);
 }
 
-TEST(ArmPlay, PosesThatShowTheGapsTellBothPlays) {
+TEST(ArmPlay, PosesThatShowTheGapsGiveBothPlays) {
   const GearedArm declared = arm_of("two_link_arm");
   for (const double shoulder : {5e-4, 2e-3, 6e-3}) {
     GearedArm machine = declared;
@@ -56,7 +56,7 @@ TEST(ArmPlay, NeverTheWrongJoint) {
   }
 }
 
-TEST(ArmPlay, PosesThatHideTheGapsAreToldWithOneThatShowsThem) {
+TEST(ArmPlay, PosesThatHideTheGapsAreReportedWithOneThatShowsThem) {
   const GearedArm arm = arm_of("two_link_arm_hidden");
   for (const JointPlay& play : diagnosed(arm, arm)) {
     EXPECT_EQ(play.estimate.status, Status::out_of_domain);
@@ -89,7 +89,7 @@ TEST(ArmPlay, FrictionAndMassThatTheFileDoesNotKnowMakeNoWrongAnswer) {
 TEST(ArmPlay, DrawnArmsAreRightOrUnknown) {
   Random random(3);
   GearedArm declared = arm_of("two_link_arm");
-  int told = 0, asked = 0;
+  int answered = 0, asked = 0;
   for (int i = 0; i < 12; ++i) {
     GearedArm machine = declared;
     const double centre = i % 3 == 0 ? 0 : -M_PI / 2, plays[] = {0, 2e-4, 1e-3, 4e-3};
@@ -113,15 +113,15 @@ TEST(ArmPlay, DrawnArmsAreRightOrUnknown) {
       const diagnosis::Estimate& e = found[j].estimate;
       ++asked;
       if (e.status != Status::ok && e.status != Status::below_range) continue;
-      ++told;
+      ++answered;
       EXPECT_LE(e.angle_lower, truth[j]) << i << ' ' << j << ' ' << e.message;
       EXPECT_GE(e.angle_upper, truth[j]) << i << ' ' << j << ' ' << e.message;
       if (e.status == Status::below_range) continue;
       EXPECT_NEAR(e.backlash_angle, truth[j], 0.1 * truth[j]) << i << ' ' << j;
     }
   }
-  std::cout << told << " of " << asked << " told\n";
-  EXPECT_GE(told, asked / 4);  // the rest stays on one flank
+  std::cout << answered << " of " << asked << " answered\n";
+  EXPECT_GE(answered, asked / 4);  // the rest stays on one flank
 }
 
 TEST(ArmPlay, APayloadThatTheFileDoesNotKnowMakesNoAnswer) {

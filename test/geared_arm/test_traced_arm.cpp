@@ -29,7 +29,7 @@ arm::ArmRecord recorded(GearedArm machine, double shift) {
 }
 
 /// The chain of a planar arm knows nothing of a tilt about the axis that its links never leave.
-TEST(TracedArm, APlanarArmTellsTheTiltThatItFeels) {
+TEST(TracedArm, APlanarArmShowsTheTiltThatItFeels) {
   const GearedArm declared = planar_arm();
   GearedArm tilted = declared;
   constexpr double kTilt = 0.12;  // rad: beyond small angles
@@ -67,9 +67,9 @@ TEST(TracedArm, EffectsOfADriveAreNamedAsTheyWereSimulated) {
   EXPECT_FALSE(trace.unexplained) << trace.unexplained->signature;
 }
 
-/// Of a body at the end of a planar arm gravity tells moments; its mass follows from inertia alone. The right
-/// values lie within three standard errors, and a body that is gone is not told.
-TEST(TracedArm, ABodyWhoseMassIsHardlyToldIsToldAsThat) {
+/// Of a body at the end of a planar arm gravity shows moments; its mass follows from inertia alone. The right
+/// values lie within three standard errors, and a body that is gone is not reported.
+TEST(TracedArm, ABodyWhoseMassIsHardlyKnownIsReportedAsThat) {
   const GearedArm declared = planar_arm();
   GearedArm loaded = declared;
   arm::Body body;
@@ -90,7 +90,7 @@ TEST(TracedArm, ABodyWhoseMassIsHardlyToldIsToldAsThat) {
   EXPECT_GT(trace.steps[0].parameters[2].measured.standard_error, 0.02);  // y: the axis of both joints
 }
 
-/// Of one link that turns slowly gravity tells a moment: a body that is gone on the other side does what one
+/// Of one link that turns slowly gravity shows a moment: a body that is gone on the other side does what one
 /// on this side does. Both are said, and the values hold the truth of either.
 TEST(TracedArm, WhatHasComeOrIsGoneIsSaidWhereBothExplainIt) {
   GearedArm declared = planar_arm();

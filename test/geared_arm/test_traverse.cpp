@@ -28,7 +28,7 @@ std::vector<JointTraverse> diagnosed(const GearedArm& machine, const GearedArm& 
   return traverses_of(declared, arm::arm_record(joints, declared.rig, "simulated"), warnings);
 }
 
-void expect_told(const diagnosis::Estimate& e, double truth) {
+void expect_play(const diagnosis::Estimate& e, double truth) {
   ASSERT_EQ(e.status, Status::ok) << e.message;
   EXPECT_NEAR(e.backlash_angle, truth, 0.1 * truth);  // the promise of the page
   EXPECT_LE(e.angle_lower, truth);
@@ -37,19 +37,19 @@ void expect_told(const diagnosis::Estimate& e, double truth) {
 }
 
 /// The interval of a joint without play holds none: an upper end, or no answer.
-void expect_no_play_told(const diagnosis::Estimate& e) {
+void expect_no_play(const diagnosis::Estimate& e) {
   EXPECT_NE(e.status, Status::ok) << e.backlash_angle << " rad: " << e.message;
   EXPECT_TRUE(std::isnan(e.backlash_angle));
 }
 
-TEST(ArmTraverse, TheMotorsAloneTellBothPlaysAndWhereTheyWereCrossed) {
+TEST(ArmTraverse, TheMotorsAloneShowBothPlaysAndWhereTheyWereCrossed) {
   const GearedArm arm = arm_of("two_link_arm");
   const std::vector<JointTraverse> found = diagnosed(arm, arm);
-  expect_told(found[0].estimate, 2e-3);
-  expect_told(found[1].estimate, 3e-3);
+  expect_play(found[0].estimate, 2e-3);
+  expect_play(found[1].estimate, 3e-3);
   for (const JointTraverse& joint : found) {
     EXPECT_LT(joint.misfit, 1.5);           // the simulated machine is the fitted one: noise is left
-    ASSERT_GE(joint.crossings.size(), 4u);  // fewer would not have been told
+    ASSERT_GE(joint.crossings.size(), 4u);  // fewer would not have been reported
     for (const Crossing& crossing : joint.crossings) {
       EXPECT_EQ(crossing.pose.size(), 2u);
       EXPECT_GT(crossing.duration, 0);
@@ -67,9 +67,9 @@ TEST(ArmTraverse, EffectsOfTheRigFileAreTakenOffTheTorque) {
   const std::vector<JointTraverse> known = diagnosed(machine, machine), unknown = diagnosed(machine, plain);
   const double truth[] = {2e-3, 3e-3};
   for (std::size_t j = 0; j < 2; ++j) {
-    expect_told(known[j].estimate, truth[j]);
+    expect_play(known[j].estimate, truth[j]);
     EXPECT_LT(known[j].misfit, 1.5) << j;  // as of a machine without effects
-    if (unknown[j].estimate.status == Status::ok) expect_told(unknown[j].estimate, truth[j]);
+    if (unknown[j].estimate.status == Status::ok) expect_play(unknown[j].estimate, truth[j]);
   }
 }
 
@@ -79,8 +79,8 @@ TEST(ArmTraverse, NeverTheWrongJoint) {
     GearedArm machine = declared;
     machine.joints[tight].gear->backlash = 0;
     const std::vector<JointTraverse> found = diagnosed(machine, declared);
-    expect_no_play_told(found[tight].estimate);
-    expect_told(found[1 - tight].estimate, machine.joints[1 - tight].gear->backlash);
+    expect_no_play(found[tight].estimate);
+    expect_play(found[1 - tight].estimate, machine.joints[1 - tight].gear->backlash);
   }
 }
 
@@ -99,11 +99,11 @@ TEST(ArmTraverse, AMachineWithoutPlayThatTheFileDoesNotKnowHasNone) {
         model::make_contact_law("linear", {{"stiffness", stiffness[j]}, {"damping", damping[j]}});
     machine.rig.joints[j].terms[std::size_t(arm::DriveTerm::coulomb)] *= 1.3;
   }
-  for (const JointTraverse& joint : diagnosed(machine, declared)) expect_no_play_told(joint.estimate);
+  for (const JointTraverse& joint : diagnosed(machine, declared)) expect_no_play(joint.estimate);
 }
 
 /// The shoulder's encoder is wrong along the turn: what its teeth throw on the elbow is not known either.
-TEST(ArmTraverse, NothingIsToldBesideAJointThatIsNotExplained) {
+TEST(ArmTraverse, NothingIsReportedBesideAJointThatIsNotExplained) {
   const GearedArm arm = arm_of("two_link_arm");
   std::vector<record::JointRecord> joints = simulate_arm(arm, kDuration);
   for (record::JointRecord& joint : joints) joint.record.column(Channel::load_position).clear();
@@ -117,17 +117,17 @@ TEST(ArmTraverse, NothingIsToldBesideAJointThatIsNotExplained) {
   EXPECT_NE(found[1].estimate.message.find("shoulder"), std::string::npos) << found[1].estimate.message;
 }
 
-TEST(ArmTraverse, ALoadThatNeverTurnsTellsNothing) {
+TEST(ArmTraverse, ALoadThatNeverTurnsShowsNoPlay) {
   const GearedArm arm = arm_of("two_link_arm_hidden");
   for (const JointTraverse& joint : diagnosed(arm, arm)) {
-    expect_no_play_told(joint.estimate);
+    expect_no_play(joint.estimate);
     EXPECT_NE(joint.estimate.message.find("cannot tell"), std::string::npos) << joint.estimate.message;
     EXPECT_TRUE(joint.crossings.empty());
   }
 }
 
 /// The shoulder's load reaches 6.7 N m on the flank that is loaded less: 5 N m of friction hide a gap.
-TEST(ArmTraverse, ALoadThatTheMotorsFrictionHidesTellsNothing) {
+TEST(ArmTraverse, ALoadThatTheMotorsFrictionHidesShowsNoPlay) {
   GearedArm rough = arm_of("two_link_arm");
   rough.rig.joints[0].terms[std::size_t(arm::DriveTerm::coulomb)] = 5;
   const std::vector<JointTraverse> found = diagnosed(rough, rough);

@@ -35,8 +35,8 @@ double errors_off(const Identification& found, const char* name, double truth) {
   return std::abs(p.value - truth) / p.standard_error;
 }
 
-// Angles tell the ratio of the two torques and not which of them is wrong: of a motor's torque that is 12 %
-// too large all that is told by it is as well.
+// Angles show the ratio of the two torques and not which of them is wrong: of a motor's torque that is 12 %
+// too large, all that is estimated with it is as well.
 TEST(Commission, ErrorsHoldEitherTorqueThatDisagrees) {
   const model::Rig rig = rig_file::default_rig_file().rig;
   const Identification right = of_rig(1), wrong = of_rig(1.12);
@@ -51,7 +51,7 @@ TEST(Commission, ErrorsHoldEitherTorqueThatDisagrees) {
   EXPECT_LT(right.parameters.at("motor_inertia").standard_error, 0.01 * rig.motor.inertia);
 }
 
-// The play is told no finer than the interval of `waveform`: +-0.6 um.
+// The play is reported no finer than the interval of `waveform`: +-0.6 um.
 TEST(Commission, PlayIsAsUncertainAsTheDiagnosisSays) {
   EXPECT_GE(of_rig(1).parameters.at("backlash").standard_error, 0.6e-6 / 1.96);
 }

@@ -22,7 +22,7 @@ TEST(Finding, TwoMeasurementsOfOneParameterAreWeighted) {
   // (6.3 +- 40 %) pulls by 1e-5.
   EXPECT_NEAR(found.at("motor_inertia").value, 7.006, 1e-4);
   EXPECT_NEAR(found.at("motor_inertia").standard_error, 0.00894 * 1.342, 1e-4);
-  EXPECT_EQ(found.count("load_inertia"), 0u);  // nothing tells it
+  EXPECT_EQ(found.count("load_inertia"), 0u);  // nothing determines it
 }
 
 TEST(Finding, DriveMinusMotorIsTheLoad) {

@@ -38,8 +38,8 @@ TEST(Identify, SquareWaveAllowsDecayAndOutputError) {
 }
 
 // Linear teeth, as declared, leave several times the noise of a record of Hertzian ones, and play that is off
-// by 3 to 7 of the errors that the record alone tells. Three standard errors.
-TEST(Identify, ErrorsHoldWhatHertzianTeethWouldBeToldAs) {
+// by 3 to 7 of the errors that the record alone states. Three standard errors.
+TEST(Identify, ErrorsHoldWhatHertzianTeethWouldBeEstimatedAs) {
   for (const double gap : {2e-4, 6e-4, 1.2e-3}) {
     model::Rig truth = test::other_servo();
     truth.mesh.backlash = gap;
@@ -57,7 +57,7 @@ TEST(Identify, ErrorsHoldWhatHertzianTeethWouldBeToldAs) {
   }
 }
 
-TEST(Identify, ARecordOfTheMotorSideAloneTellsItsFriction) {
+TEST(Identify, ARecordOfTheMotorSideAloneShowsItsFriction) {
   // Speeds with their torque, as a drive without load encoder shows them: 63 + 13 w of the motor, 15 + 9 w of
   // the load.
   record::Record record;

@@ -10,7 +10,7 @@ RecordAlone record(const std::string& name, double inertia, double friction, dou
   return {name, {{"load_inertia", {inertia, 0.1}}, {"motor_coulomb", {friction, 0.2}}}, left};
 }
 
-TEST(SeveralMachines, AreToldByTheValuesThatClearlyDiffer) {
+TEST(SeveralMachines, AreNamedByTheValuesThatClearlyDiffer) {
   const auto found = several_machines(
       {record("a.csv", 108, 60, 1), record("b.csv", 150, 60.5, 1.1), record("c.csv", 109, 50, 1)}, 100);
   ASSERT_TRUE(found);
@@ -25,7 +25,7 @@ TEST(SeveralMachines, AreToldByTheValuesThatClearlyDiffer) {
       << text;
 }
 
-TEST(SeveralMachines, AreNotToldWhereTheModelLacksSomethingOrNothingDiffers) {
+TEST(SeveralMachines, AreNotReportedWhereTheModelLacksSomethingOrNothingDiffers) {
   // More than noise is left of one alone, and more than a fifth of what all leave.
   EXPECT_FALSE(several_machines({record("a.csv", 108, 60, 1), record("b.csv", 150, 60, 4)}, 10));
   EXPECT_TRUE(several_machines({record("a.csv", 108, 60, 1), record("b.csv", 150, 60, 4)}, 100));

@@ -120,7 +120,7 @@ TEST(ToothPairsExplained, ByTransmissionErrorsOfTheirOrders) {
   // each of 1e5 samples leaves 1e-8 rad. Three per cent of the wave hold both.
   for (const double order : kOrders)
     EXPECT_NEAR(r * fit.amplitude.at(order), expected.at(order), 0.03 * expected.at(order)) << order;
-  // 2 pi of travel and this noise tell the order to some 1e-3; the multiples of 280 are further off.
+  // 2 pi of travel and this noise give the order to some 1e-3; the multiples of 280 are further off.
   EXPECT_NEAR(order_that_fits(shown, 280.2), 280, 0.01);
 
   // The same machine with one mesh, without and with the terms.

@@ -130,7 +130,7 @@ TEST(ContactLaws, KelvinVoigtJumpsAtTouchAndPullsAtTheEnd) {
   EXPECT_DOUBLE_EQ(law->force(1e-5, -0.6, 0), -4);
 }
 
-// Two forces at the same d and d' tell D / v; from the published equations by hand.
+// Two forces at the same d and d' give D / v; from the published equations by hand.
 TEST(ContactLaws, DampingFollowsTheImpactSpeed) {
   const ParameterValues falling = {
       {"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 0.5}, {"beta", 0.25}, {"minimum_speed", 0.01}};

@@ -158,7 +158,7 @@ TEST(GearGeometry, SmallChangeFormsAreItsLimit) {
   EXPECT_NEAR(g.pitch_circle_backlash, 2 * change * std::tan(phi), 3e-5 * g.backlash);
 }
 
-TEST(GearGeometry, FaultsAndRemarksAreTold) {
+TEST(GearGeometry, FaultsAndRemarksAreReported) {
   // The least number of teeth that a rack of addendum 1 does not undercut is 2 / sin^2 20 deg = 17.097, and
   // with a rack the same limit is that of interference; a mate of few teeth reaches less deep.
   EXPECT_TRUE(gear_geometry(gear_pair(18, 18, 1e-3)).remarks.empty());

@@ -89,7 +89,7 @@ TEST(GearTrain, SensorShowsTheSpringOrSpringAndDamper) {
   EXPECT_NEAR(GearTrain(rig).observe(s.data(), 0).sensor_torque, spring + damper, 1e-14);
 }
 
-// Acceleration of the first part under 1 N m, at rest in the middle of the gap: tells the inertia that it
+// Acceleration of the first part under 1 N m, at rest in the middle of the gap: gives the inertia that it
 // moves.
 double felt_inertia(const Rig& rig) {
   const GearTrain train(rig);

@@ -73,7 +73,7 @@ TEST(Presliding, AlongSamplesItSolvesTheDifferentialEquation) {
   }
 }
 
-// A sine sampled anywhere turns between samples; the rates tell where.
+// A sine sampled anywhere turns between samples; the rates say where.
 TEST(Presliding, BetweenSamplesTheTurnIsFound) {
   const double interval = 1e-3, w = 2 * M_PI * 3, amplitude = 4e-3;
   const auto q = [&](double t) { return amplitude * std::sin(w * t); };

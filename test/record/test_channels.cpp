@@ -33,7 +33,7 @@ TEST(Channels, AreReadWithTheirDefaults) {
   EXPECT_EQ(map.sources[3].offset, 0.5);
 }
 
-TEST(Channels, AreThoseOfThisPackageWhereNoneAreTold) {
+TEST(Channels, AreThoseOfThisPackageWhereNoneAreGiven) {
   const ChannelMap map = parse("{}\n");
   EXPECT_FALSE(map.declared);
   EXPECT_EQ(map.sources.front().name, "elbow_motor");

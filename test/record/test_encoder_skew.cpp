@@ -28,7 +28,7 @@ signal::Measured skew_of(test::LedServo s, double late, double interval) {
 }
 
 // Truth within two standard errors, as the estimate says of itself; at 250 Hz as at 1 kHz.
-TEST(EncoderSkew, IsToldBesidePlayComplianceAndFriction) {
+TEST(EncoderSkew, IsEstimatedBesidePlayComplianceAndFriction) {
   for (const double interval : {1e-3, 4e-3})
     for (const double gap : {0.0, 5e-4, 2e-3})
       for (const double late : {-3e-3, 0.0, 2e-3, 5e-3, 2e-2}) {
@@ -52,7 +52,7 @@ TEST(EncoderSkew, DragOfTheMotorIsNone) {
   EXPECT_TRUE(is_clear(skew_of(s, 2e-2, 1e-3)));
 }
 
-TEST(EncoderSkew, IsNotToldOfALoadThatStands) {
+TEST(EncoderSkew, IsNotEstimatedOfALoadThatStands) {
   const std::vector<double> none(5000, 0.0);
   EXPECT_THROW(encoder_skew({1e-3, none, none, none, 1}), CannotIdentify);
   const std::vector<double> few(20, 1.0);

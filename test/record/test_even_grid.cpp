@@ -167,5 +167,24 @@ TEST(Resampled, AFasterRecordIsBroughtToTheRateOfTheSlower) {
   EXPECT_THROW(resampled(fast, 0.001), InvalidParameter);
 }
 
+TEST(Resampling, ALongGapCutsARecord) {
+  Record r;
+  r.name = "run.csv";
+  for (int k = 0; k < 1000; ++k)
+    if ((k < 300 || k >= 340) && (k < 500 || k >= 560) && (k < 580 || k >= 650)) {
+      r.time.push_back(1e-3 * k);
+      r.column(Channel::motor_torque).push_back(k);
+    }
+  const std::vector<Record> parts = parts_between_gaps(r);  // 40 lost rows are no gap, 20 rows no part
+  ASSERT_EQ(parts.size(), 2u);
+  EXPECT_EQ(parts[0].size(), 460u);
+  EXPECT_EQ(parts[1].size(), 350u);
+  EXPECT_EQ(parts[1].column(Channel::motor_torque).front(), 650);
+  EXPECT_EQ(parts[1].name, "run.csv from 0.65 s");
+  ASSERT_EQ(parts[0].warnings.size(), 1u);
+  EXPECT_NE(parts[0].warnings[0].find("cut at 2 gaps of more than 0.05 s"), std::string::npos);
+  EXPECT_EQ(parts_between_gaps(parts[0]).size(), 1u);
+}
+
 }  // namespace
 }  // namespace backlash::record

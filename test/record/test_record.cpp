@@ -50,7 +50,7 @@ TEST(Record, ChannelsHaveTheUnitsOfARotaryAxis) {
   EXPECT_STREQ(channel_unit(Channel::acceleration), "rad/s^2");
 }
 
-TEST(Record, TellsByAnyTorquePositionMotorSpeedCurrentOrAcceleration) {
+TEST(Record, NeedsAnyTorquePositionMotorSpeedCurrentOrAcceleration) {
   for (const Channel channel : kChannels) {
     Record record;
     record.time = {0};

@@ -122,7 +122,7 @@ TEST(RecordCheck, ACounterOfRepeatedStampsIsPassedOn) {
 }
 
 // The motion goes on by one sample while the stamps go on by half a second.
-TEST(RecordCheck, TellsAStepOfTheClockFromLostSamples) {
+TEST(RecordCheck, DistinguishesAStepOfTheClockFromLostSamples) {
   const auto stamped = [](int k) { return k * kInterval + (k > 5000 ? 0.5 : 0); };
   const CheckedRecord checked = check_record(recorded([](int k) { return k * kInterval; }, stamped), servo());
   const Finding* const step = find(checked.check, FindingKind::clock_step);
@@ -141,7 +141,7 @@ std::vector<double> jitter(double share) {
   return out;
 }
 
-TEST(RecordCheck, TellsStampsThatJitterFromSamplesThatAreLate) {
+TEST(RecordCheck, DistinguishesStampsThatJitterFromSamplesThatAreLate) {
   const std::vector<double> late = jitter(0.2);
   const auto even = [](int k) { return k * kInterval; };
   const auto uneven = [&](int k) { return k * kInterval + late[std::size_t(k)]; };
@@ -242,6 +242,39 @@ TEST(RecordCheck, SaysHowOftenAHeldChannelIsRead) {
               5);  // Hz; where it turns round some are equal by chance
 }
 
+// Only the rows in which the encoder was read are used: 0, 8, 16 of the record as it was before it was held.
+TEST(RecordCheck, UsesTheRowsWithNewValues) {
+  const Record before = healthy();
+  for (const bool torque : {false, true}) {
+    Record r = before;
+    for (std::size_t k = 0; k < r.size(); ++k) {
+      r.column(Channel::load_position)[k] = before.column(Channel::load_position)[k - k % 8];
+      if (torque) r.column(Channel::motor_torque)[k] = before.column(Channel::motor_torque)[k - k % 8];
+    }
+    const CheckedRecord checked = check_record(r, servo());
+    for (const Finding& finding : checked.check.findings)
+      EXPECT_EQ(finding.consequence == Consequence::mended, finding.channel == "load_position");
+    ASSERT_NEAR(double(checked.record.size()), double(before.size()) / 8, 3);
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < checked.record.size(); ++i)
+      wrong += std::size_t(std::lround(checked.record.time[i] / kInterval)) % 8 != 0;
+    EXPECT_LE(wrong, 3u);  // choice: where the encoder happens to read alike twice
+  }
+}
+
+// Of channels that are new in turn no row has both.
+TEST(RecordCheck, KeepsHeldRowsWhereChannelsAreNewInTurn) {
+  const Record before = healthy();
+  Record r = before;
+  for (std::size_t k = 4; k < r.size(); ++k) {
+    r.column(Channel::load_position)[k] = before.column(Channel::load_position)[k - k % 8];
+    r.column(Channel::motor_position)[k] = before.column(Channel::motor_position)[k - (k + 4) % 8];
+  }
+  const CheckedRecord checked = check_record(r, servo());
+  EXPECT_EQ(find(checked.check, FindingKind::held_samples)->consequence, Consequence::noted);
+  EXPECT_EQ(checked.record.size(), before.size());
+}
+
 TEST(RecordCheck, RefusesATorqueThatWasNotRecorded) {
   Record r = healthy();
   r.column(Channel::motor_torque).assign(r.size(), 0.0);
@@ -308,6 +341,20 @@ TEST(RecordCheck, CountsWhatIsNoNumber) {
   const Finding* const none = find(checked.check, FindingKind::not_finite);
   ASSERT_NE(none, nullptr);
   EXPECT_NEAR(none->from, 500 * kInterval, 1e-9);
+  EXPECT_EQ(none->consequence, Consequence::mended);
+  erase_row(r, 500);
+  EXPECT_EQ(checked.record.time, r.time);
+  EXPECT_EQ(checked.record.column(Channel::load_position), r.column(Channel::load_position));
+}
+
+TEST(RecordCheck, AChannelOfHardlyANumberIsAbsent) {
+  Record r = healthy();
+  r.column(Channel::load_velocity).assign(r.size(), NAN);
+  r.column(Channel::load_velocity)[7] = 1;
+  const CheckedRecord checked = check_record(r, servo());
+  EXPECT_NE(find(checked.check, FindingKind::not_finite), nullptr);
+  EXPECT_FALSE(checked.record.has(Channel::load_velocity));
+  EXPECT_EQ(checked.record.size(), r.size());
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ TEST(SharedSamples, OfACopyAHalfAndAnother) {
   EXPECT_EQ(shared_samples(later, record), 1);
 }
 
-TEST(SharedSamples, WhatRestsTellsNothing) {
+TEST(SharedSamples, WhatRestsSaysNothing) {
   Record record = noisy(1);
   for (const Channel channel : {Channel::motor_torque, Channel::motor_position})
     record.column(channel).assign(record.size(), 3);

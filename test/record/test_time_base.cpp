@@ -121,7 +121,7 @@ std::vector<double> zigzag_time(double displacement) {
   return time;
 }
 
-TEST(TimeBase, JitterAboveFivePercentIsTold) {
+TEST(TimeBase, JitterAboveFivePercentIsReported) {
   // 1000 intervals, half T + 2d and half T - 2d, median T.
   EXPECT_TRUE(describe_time_base(zigzag_time(0.024 * kInterval)).empty());
   const auto warnings = describe_time_base(zigzag_time(kInterval / 16));

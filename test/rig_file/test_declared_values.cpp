@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What people are told of the values of a rig file. The oracle is what is written into the text.
+// What people read of the values of a rig file. The oracle is what is written into the text.
 #include <gtest/gtest.h>
 
 #include <algorithm>

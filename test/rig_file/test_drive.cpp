@@ -32,7 +32,7 @@ TEST(Drive, PartsTurnAsTheTeethSay) {
   for (const auto& [name, order] : expected) EXPECT_NEAR(parts.at(name), order, 1e-9) << name;
 }
 
-TEST(Drive, RatioOfTheRigWhereItTellsNone) {
+TEST(Drive, RatioOfTheRigWhereItStatesNone) {
   EXPECT_EQ(drive_of("wave_generator: true\n").reduction_ratio, 110);
   const auto parts = turning_parts(drive_of("wave_generator: true\n"));
   EXPECT_EQ(parts.back().order, 220);

@@ -103,10 +103,10 @@ class ArmTest(unittest.TestCase):
         reports = Inbox("/watched/changes", ChangeReport)
 
         def looked(messages):
-            """The status once three looks could tell."""
+            """The status once three looks have an answer."""
             for status in (s for m in reversed(messages) for s in m.status if s.name.endswith("two_link_arm: model")):
                 values = {v.key: v.value for v in status.values}
-                return (status, values) if int(values["Looks that could tell"]) >= 3 else None
+                return (status, values) if int(values["Looks with an answer"]) >= 3 else None
             return None
         status, values = Inbox("/diagnostics", DiagnosticArray).wait_for(looked, "looks")
         self.assertEqual((status.level, reports.messages), (DiagnosticStatus.OK, []), status.message)
@@ -142,7 +142,7 @@ class ArmTest(unittest.TestCase):
         self.assertGreaterEqual(change.since_to, before)
         self.assertLess(change.error_after, change.error_before)
 
-    def test_live_is_as_offline_and_a_recorded_bag_tells_both_plays(self):
+    def test_live_is_as_offline_and_a_recorded_bag_gives_both_plays(self):
         bag, offline = (os.path.join(self.folder, name) for name in ("live.bag", "offline.bag"))
         parameters = {"rig": RIG, "seed": 5, "duration": 20.0, "real_time_factor": 4.0, "publish_clock": False,
                       "wait_for_subscriber": True, "set_robot_description": False}
@@ -165,7 +165,7 @@ class ArmTest(unittest.TestCase):
             verdict = joints[joint]["verdict"]
             lower, upper = verdict["angle_interval"]
             self.assertTrue(lower <= PLAY[joint] <= upper, verdict)
-            self.assertLess(upper - lower, 0.1 * PLAY[joint])  # as doc/arm.md says: 5 %
+            self.assertLess(upper - lower, 0.1 * PLAY[joint])  # twice the width that doc/arm.md shows
             self.assertLessEqual(abs(verdict["backlash_angle"] - PLAY[joint]), 0.05 * PLAY[joint])
 
     def test_a_joint_takes_its_torque_from_its_topic_and_its_backlash_from_its_service(self):

@@ -87,9 +87,9 @@ class ChangeWatchTest(unittest.TestCase):
         self.assertGreaterEqual(change.since_to + length, before)
 
     def looked(self, more):
-        """Waits for so many further looks that could tell."""
-        first = number(self.statuses.wait_for("wrist: model", lambda s: True, "status"), "Looks that could tell")
-        return self.statuses.wait_for("wrist: model", lambda s: number(s, "Looks that could tell") >= first + more,
+        """Waits for so many further looks with an answer."""
+        first = number(self.statuses.wait_for("wrist: model", lambda s: True, "status"), "Looks with an answer")
+        return self.statuses.wait_for("wrist: model", lambda s: number(s, "Looks with an answer") >= first + more,
                                       "further look")
 
     def test_1_says_why_it_cannot_tell(self):

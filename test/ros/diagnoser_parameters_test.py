@@ -66,7 +66,7 @@ class DiagnoserParametersTest(unittest.TestCase):
                            "backlash_angle: 1.0e-3\nangle_interval: [0.9e-3, 1.1e-3]\n")
         self.assert_refused({"baseline": other}, "other.yaml", "'elbow', not of 'sarkar_1997'")
 
-    def test_a_robot_whose_joints_are_not_told_apart_is_refused(self):
+    def test_a_robot_whose_joints_are_not_distinguished_is_refused(self):
         def folder(**rigs):
             path = tempfile.mkdtemp(dir=self.folder)
             for name, text in rigs.items():
@@ -136,7 +136,7 @@ class DiagnoserParametersTest(unittest.TestCase):
         self.assertIn("healthy.yaml", answer.message)
         self.assertNotIn("since the baseline", diagnoser.diagnose(periods=10, timeout=TIMEOUT).message)
 
-    def test_files_of_another_version_of_the_rig_file_are_told(self):
+    def test_files_of_another_version_of_the_rig_file_are_reported(self):
         with open(rig_path()) as stream:
             edited = self.write("edited.yaml", stream.read() + "# a remark\n")
         healthy = self.write("healthy.yaml", "schema_version: 1\nrig: sarkar_1997\nrig_digest: x\n"

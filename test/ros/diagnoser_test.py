@@ -55,13 +55,13 @@ class DiagnoserTest(unittest.TestCase):
         self.distributions.since(stamp, 1, later_than=stamp + (periods + 1) * PERIOD)
 
     def test_service_finds_three_backlash_values(self):
-        told = 0
+        answered = 0
         for backlash in (2e-5, 8e-5, 1.6e-4):
             # 3 periods for the motion to settle at the new gap, 10 for the diagnosis
             self.settle(self.inject(backlash), 13)
             answer = self.diagnoser.diagnose(periods=10, timeout=TIMEOUT)
             if answer.success:
-                told += 1
+                answered += 1
                 self.assertIn(answer.estimates[answer.verdict.estimate].method, ("lost_motion", "waveform"))
             else:  # the interval of one method missed those of the others: no value is better than a wrong one
                 self.assertIn("cannot tell; disagree", answer.message)
@@ -84,7 +84,7 @@ class DiagnoserTest(unittest.TestCase):
                 slack = 0 if open_end else 0.5 * (estimate.upper - estimate.lower)
                 self.assertLessEqual(estimate.lower - slack, backlash, estimate.method)
                 self.assertTrue(open_end or estimate.upper + slack >= backlash, estimate.method)
-        self.assertGreaterEqual(told, 2)
+        self.assertGreaterEqual(answered, 2)
 
     def test_injected_fault_is_seen_within_a_second(self):
         self.settle(self.inject(2e-5), 8)
@@ -224,7 +224,7 @@ class DiagnoserTest(unittest.TestCase):
             self.assertNotEqual(answer.estimates[0].status_name, "insufficient_data", answer.estimates[0].message)
             self.assertEqual(diagnoser.curve().curve.sampling_rate, 1000)
 
-    def test_diagnostics_tell_backlash_and_input(self):
+    def test_diagnostics_report_backlash_and_input(self):
         diagnostics = Diagnostics()
         _, values = diagnostics.wait_for("joint: backlash", lambda l, m, v: "Grade" in v, "a grade")
         self.assertIn(values["Grade"], ("good", "watch", "service", "stop"))

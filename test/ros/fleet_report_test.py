@@ -27,10 +27,10 @@ class FleetReportTest(FleetTest):
         self.assertEqual(json.loads(one["verdict"]), direct["verdict"])
         self.assertEqual(json.loads(one["estimates"]), direct["estimates"])
         self.assertEqual(one["rig_digest"], direct["rig_digest"])
-        told = json.loads(self.read("out/fleet.json"))
-        self.assertEqual([(j["joint"], j["level"]) for j in told["joints"]],
+        fleet = json.loads(self.read("out/fleet.json"))
+        self.assertEqual([(j["joint"], j["level"]) for j in fleet["joints"]],
                          [("cell1/worn", "fault"), ("cell1/ageing", "good"), ("cell2/still", "good")])
-        for joint in told["joints"]:
+        for joint in fleet["joints"]:
             play, growth = JOINTS[joint["joint"]]
             low, high = (rate * 7 * 86400 for rate in joint["trend"]["rate_interval"])
             # 95 % of three joints: 2e-7 rad per week besides, a tenth of a thousandth of the play.
@@ -40,7 +40,7 @@ class FleetReportTest(FleetTest):
             self.assertEqual(joint["trend"]["warnings"], [])
         self.assertIn("cell1/worn", self.read("out/fleet.html"))
         # From 0.5 mrad by 0.02 mrad per week to 1.2 mrad: 35 weeks after the first record, 2027-04-05.
-        self.assertEqual(told["joints"][1]["trend"]["reaches"]["date"][:7], "2027-04")
+        self.assertEqual(fleet["joints"][1]["trend"]["reaches"]["date"][:7], "2027-04")
 
     def test_what_cannot_be_used_is_a_row_with_its_reason(self):
         count = self.records(2)
@@ -67,9 +67,9 @@ class FleetReportTest(FleetTest):
         self.assertEqual(rows["notes.csv"]["reason"], "no entry of the map matches it")
         self.assertEqual(rows["cell2/still/20270101T000000.csv"]["key"], rows["cell2/still/" + first]["key"])
         self.assertIsNone(rows["cell2/still/yesterday.csv"]["time"])
-        told = json.loads(self.read("out/fleet.json"))
-        self.assertEqual(told["without_joint"], [{"record": "notes.csv", "reason": "no entry of the map matches it"}])
-        notes = [n for joint in told["joints"] if joint["joint"] == "cell2/still" for n in joint["notes"]]
+        fleet = json.loads(self.read("out/fleet.json"))
+        self.assertEqual(fleet["without_joint"], [{"record": "notes.csv", "reason": "no entry of the map matches it"}])
+        notes = [n for joint in fleet["joints"] if joint["joint"] == "cell2/still" for n in joint["notes"]]
         self.assertIn("1 of 5 records cannot be used", notes[0])
         self.assertIn("{time} in the name is none", notes[1])
 

@@ -62,11 +62,11 @@ class LiveWaveformTest(unittest.TestCase):
     def test_2_an_old_answer_has_the_stamp_of_its_samples(self):
         first = nanoseconds(self.fitted())
         later = nanoseconds(self.fitted(later_than=first))
-        told = [m for m in self.estimates.messages
+        fitted = [m for m in self.estimates.messages
                 if m.method == "waveform" and m.status_name == "ok" and nanoseconds(m) in (first, later)]
         self.assertGreater(later - first, 0)
-        self.assertGreater(len(told), 2)  # told again beside the running estimates of the others
-        for message in told:
+        self.assertGreater(len(fitted), 2)  # reported again beside the running estimates of the others
+        for message in fitted:
             self.assertRegex(message.message, r"of samples that ended \d+\.\d s before")
 
     def test_3_no_sample_is_lost_to_a_fit(self):
@@ -82,7 +82,7 @@ class LiveWaveformTest(unittest.TestCase):
             self.assertEqual(message.samples, RATE // 10)
         self.assertGreater(sent, 2 * RATE)
 
-    def test_4_what_in_the_file_is_wrong_is_told(self):
+    def test_4_what_in_the_file_is_wrong_is_reported(self):
         self.fitted()
         warn = 1
         status, _ = Diagnostics().wait_for("joint: curve domain", lambda l, m, v: "run identify" in m, "a wrong value")

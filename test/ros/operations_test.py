@@ -174,7 +174,7 @@ class OperationsTest(unittest.TestCase):
         self.assertEqual((answer["window"], answer["refused"]), (5, "window = -3: must be >= 1"))
         self.assertEqual(common.update_configuration({"window": 2, "stale": 0.5})["window"], 2)
         self.diagnostics.wait_for(diagnoser.name[1:] + ": joint: input", lambda l, m, v: level(l) == 3, "STALE")
-        # What was set live is no configuration: the next diagnoser of this name starts as it is told.
+        # What was set live is no configuration: the next diagnoser of this name starts as its parameters say.
         self.assertEqual(rospy.get_param(diagnoser.topic("live/window")), 2)
         self.assertFalse(rospy.has_param(diagnoser.topic("window")))
 

@@ -33,7 +33,7 @@ class SimulatedRobotTest(unittest.TestCase):
         self.fail("%s: %s" % (joint, "\n".join(a.message for a in answers[-20:])))
 
     @staticmethod
-    def told(joint, backlash, grade):
+    def holds(joint, backlash, grade):
         # The verdict's own interval holds the truth.
         return lambda v: (v.grade == grade and v.angle_lower <= backlash <= v.angle_upper
                           and v.angle_upper - v.angle_lower < WIDEST[joint] * backlash)
@@ -43,21 +43,21 @@ class SimulatedRobotTest(unittest.TestCase):
         self.assertEqual((sorted(states.name), states.velocity), (["elbow_joint", "shoulder_joint", "wrist_joint"], ()))
         self.assertEqual(rospy.wait_for_message("/link_states", JointState, TIMEOUT).name, ["shoulder_link"])
 
-    def test_2_ordinary_motion_tells_both_joints(self):
+    def test_2_ordinary_motion_shows_both_joints(self):
         for joint, method in (("shoulder", "position_difference"), ("elbow", "gap_traverse")):
-            told = self.told(joint, NEW, "good")
-            self.until(joint, lambda v, told=told, method=method: told(v) and method in v.members)
+            holds = self.holds(joint, NEW, "good")
+            self.until(joint, lambda v, holds=holds, method=method: holds(v) and method in v.members)
 
-    def test_3_a_joint_that_wears_is_told_and_the_other_not_accused(self):
+    def test_3_a_joint_that_wears_is_reported_and_the_other_not_accused(self):
         service("/simulator/shoulder/set_backlash", SetBacklash)(WORN)
-        answers = self.until("shoulder", self.told("shoulder", WORN, "service"))
+        answers = self.until("shoulder", self.holds("shoulder", WORN, "service"))
         for a in answers:
             rospy.loginfo(a.message)
         # As long as old motion is in the record, or the motion is short, the answer may lie between, never outside.
         for answer in (a for a in answers if a.success):
             self.assertLessEqual(answer.verdict.angle_lower, WORN, answer.message)
             self.assertGreaterEqual(answer.verdict.angle_upper, NEW, answer.message)
-        self.until("elbow", self.told("elbow", NEW, "good"))
+        self.until("elbow", self.holds("elbow", NEW, "good"))
 
 
 if __name__ == "__main__":

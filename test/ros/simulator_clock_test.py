@@ -11,7 +11,7 @@ from simulator_support import Inbox, nanoseconds, steps
 
 
 class SimulatorClockTest(unittest.TestCase):
-    def test_clock_and_joint_states_tell_the_same_time(self):
+    def test_clock_and_joint_states_have_the_same_time(self):
         clock, joint_states = Inbox("/clock", Clock), Inbox("joint_states", JointState)
         samples = joint_states.wait_for_count(2001)[:2001]
         self.assertEqual(set(steps(samples)), {1000000})  # ns

@@ -107,7 +107,7 @@ class SimulatorTest(unittest.TestCase):
             self.assertIn("must be", answer.message)
         self.assertEqual(latched("true_backlash", Float64).data, 2e-5)
 
-    def test_diagnostics_tell_lag_and_integrator_steps(self):
+    def test_diagnostics_report_lag_and_integrator_steps(self):
         def status(messages):
             found = [s for m in messages for s in m.status if s.name == "simulator: simulation"]
             return found[-1] if found else None

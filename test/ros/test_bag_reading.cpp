@@ -162,7 +162,7 @@ TEST_F(BagReading, IsInTheOrderOfReceiptWhateverTheOrderInTheFile) {
     }
 }
 
-TEST_F(BagReading, WhatIsDamagedIsToldBeforeWhatIsMissing) {
+TEST_F(BagReading, DamageIsReportedBeforeWhatIsMissing) {
   write(in_order(300), rosbag::compression::LZ4, 3000);
   EXPECT_NE(refusal("/nowhere").find("no topic"), std::string::npos);
   std::string damaged = bytes();
@@ -176,7 +176,7 @@ TEST_F(BagReading, WhatIsDamagedIsToldBeforeWhatIsMissing) {
 }
 
 /// The header of an encrypted bag as rosbag writes it: one more field, taken from the padding behind it.
-TEST_F(BagReading, AnEncryptedBagIsToldAsThat) {
+TEST_F(BagReading, AnEncryptedBagIsReportedAsThat) {
   write(in_order(10), rosbag::compression::Uncompressed, 3000);
   std::string changed = bytes();
   const std::size_t start = std::strlen("#ROSBAG V2.0\n");

@@ -35,7 +35,7 @@ std::string failure(const Job& job) {
   return "no failure";
 }
 
-TEST(Job, TellsHowFarItIsAndWhatItHas) {
+TEST(Job, ReportsHowFarItIsAndWhatItHas) {
   Job job = shell(
       "echo 'no progress'; echo '{\"fraction\":0.25,\"phase\":\"first\",\"best\":\"a\"}'; sleep 0.3;"
       "echo '{\"fraction\":0.75,\"phase\":\"second\",\"best\":\"b\"}'; sleep 0.3; exit 3");
@@ -58,7 +58,7 @@ TEST(Job, RunsAtTheLowestPriorityAndIsTheFirstToBeEnded) {
   EXPECT_EQ(failure(job), "19 1000");
 }
 
-TEST(Job, FailuresAreToldInItsLastWords) {
+TEST(Job, FailuresAreReportedInItsLastWords) {
   EXPECT_EQ(failure(shell("echo first >&2; echo 'sh: no such record' >&2; exit 66")), "no such record");
   EXPECT_EQ(failure(shell("exit 5")), "sh ended with exit code 5");
   EXPECT_NE(failure(shell("kill -9 $$")).find("sh was ended by signal 9"), std::string::npos);

@@ -41,7 +41,7 @@ record::ChannelMap elbow() {
   return map;
 }
 
-struct Told {
+struct Taken {
   std::size_t joint;
   double time;
   record::ChannelValues values;
@@ -49,24 +49,24 @@ struct Told {
   double at(Channel channel) const { return values[static_cast<std::size_t>(channel)]; }
 };
 
-JointInputs::OnSample into(std::vector<Told>& told) {
-  return [&told](std::size_t joint, const ros::Time& stamp, const record::ChannelValues& values,
-                 const std::string& problem) {
-    told.push_back({joint, stamp.toSec(), values, problem});
+JointInputs::OnSample into(std::vector<Taken>& taken) {
+  return [&taken](std::size_t joint, const ros::Time& stamp, const record::ChannelValues& values,
+                  const std::string& problem) {
+    taken.push_back({joint, stamp.toSec(), values, problem});
   };
 }
 
 TEST(JointInputs, ReadsAStockMessageByTheMap) {
   JointInputs inputs({elbow()});
-  std::vector<Told> told;
-  inputs.take(0, robot(10), into(told));
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_EQ(told[0].problem, "");
-  EXPECT_EQ(told[0].at(Channel::motor_position), 20);
-  EXPECT_EQ(told[0].at(Channel::motor_velocity), 2);
-  EXPECT_EQ(told[0].at(Channel::motor_torque), -12 * 0.25 + 1);
-  EXPECT_EQ(told[0].at(Channel::load_position), 1);
-  EXPECT_TRUE(std::isnan(told[0].at(Channel::sensor_torque)));
+  std::vector<Taken> taken;
+  inputs.take(0, robot(10), into(taken));
+  ASSERT_EQ(taken.size(), 1u);
+  EXPECT_EQ(taken[0].problem, "");
+  EXPECT_EQ(taken[0].at(Channel::motor_position), 20);
+  EXPECT_EQ(taken[0].at(Channel::motor_velocity), 2);
+  EXPECT_EQ(taken[0].at(Channel::motor_torque), -12 * 0.25 + 1);
+  EXPECT_EQ(taken[0].at(Channel::load_position), 1);
+  EXPECT_TRUE(std::isnan(taken[0].at(Channel::sensor_torque)));
 }
 
 TEST(JointInputs, JoinsTwoTopics) {
@@ -74,13 +74,13 @@ TEST(JointInputs, JoinsTwoTopics) {
   map.sources[3] = {Channel::load_position, "encoders", "elbow_link", Field::position, -1, 0.5};
   JointInputs inputs({map});
   ASSERT_EQ(inputs.topics(), (std::vector<std::string>{"joint_states", "encoders"}));
-  std::vector<Told> told;
+  std::vector<Taken> taken;
   for (int k = 0; k < 100; ++k) {
-    inputs.take(0, robot(10 + 0.01 * k), into(told));
-    inputs.take(1, encoder(10.004 + 0.01 * k), into(told));
+    inputs.take(0, robot(10 + 0.01 * k), into(taken));
+    inputs.take(1, encoder(10.004 + 0.01 * k), into(taken));
   }
-  ASSERT_EQ(told.size(), 99u);  // the first has no other before it
-  for (const Told& t : told) {
+  ASSERT_EQ(taken.size(), 99u);  // the first has no other before it
+  for (const Taken& t : taken) {
     EXPECT_EQ(t.problem, "");
     EXPECT_NEAR(t.at(Channel::motor_position), 2 * t.time, 1e-6);                    // stamps are whole ns
     EXPECT_NEAR(t.at(Channel::load_position), t.at(Channel::motor_position), 1e-6);  // as encoder() has it
@@ -91,10 +91,10 @@ TEST(JointInputs, SaysWhichNamesThereAreWhereOneIsMissing) {
   record::ChannelMap map = elbow();
   map.sources[0].name = "elbow";
   JointInputs inputs({map});
-  std::vector<Told> told;
-  for (int k = 0; k < 64; ++k) inputs.take(0, robot(10 + 0.01 * k), into(told));
+  std::vector<Taken> taken;
+  for (int k = 0; k < 64; ++k) inputs.take(0, robot(10 + 0.01 * k), into(taken));
   std::vector<std::string> problems;
-  for (const Told& t : told)
+  for (const Taken& t : taken)
     if (!t.problem.empty()) problems.push_back(t.problem);
   ASSERT_EQ(problems.size(), 2u);  // after 32 and 64 messages
   EXPECT_EQ(problems[0],
@@ -105,11 +105,11 @@ TEST(JointInputs, ANameMaySpeakOfSeveralJoints) {
   record::ChannelMap other = elbow();
   other.joint = "other";
   JointInputs inputs({elbow(), other});
-  std::vector<Told> told;
-  inputs.take(0, robot(10), into(told));
-  ASSERT_EQ(told.size(), 2u);
-  EXPECT_EQ(told[0].joint, 0u);
-  EXPECT_EQ(told[1].joint, 1u);
+  std::vector<Taken> taken;
+  inputs.take(0, robot(10), into(taken));
+  ASSERT_EQ(taken.size(), 2u);
+  EXPECT_EQ(taken[0].joint, 0u);
+  EXPECT_EQ(taken[1].joint, 1u);
 }
 
 }  // namespace

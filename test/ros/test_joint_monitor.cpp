@@ -20,7 +20,7 @@ namespace {
 using test::make_record;
 using test::values_at;
 
-/// What a monitor tells, in the order in which it does.
+/// What a monitor reports, in the order in which it does.
 struct Heard {
   std::mutex mutex;
   std::vector<ros::Time> stamps;
@@ -74,9 +74,9 @@ TEST_F(JointMonitorTest, EachPeriodHasItsEstimateAndItIsThatOfItsSamples) {
 TEST_F(JointMonitorTest, ASlowJointDelaysNobody) {
   std::promise<void> allowed;
   const std::shared_future<void> wait = allowed.get_future().share();
-  std::vector<ros::Time> told;
+  std::vector<ros::Time> reported;
   JointMonitor slow(monitor_settings("slow"), [&](const ros::Time& stamp, const diagnosis::Diagnosis&) {
-    told.push_back(stamp);
+    reported.push_back(stamp);
     wait.wait();
   });
   Heard heard;
@@ -103,10 +103,10 @@ TEST_F(JointMonitorTest, ASlowJointDelaysNobody) {
   allowed.set_value();
   slow.stop();
   EXPECT_GT(slow.state().replaced, 0);
-  // What came last is told, and every estimate was told or counted.
-  EXPECT_EQ(told.back(), stamp_of(record.time.back()));
-  EXPECT_EQ(static_cast<long>(told.size()) + slow.state().replaced, periods);
-  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  // What came last is reported, and every estimate was reported or counted.
+  EXPECT_EQ(reported.back(), stamp_of(record.time.back()));
+  EXPECT_EQ(static_cast<long>(reported.size()) + slow.state().replaced, periods);
+  EXPECT_TRUE(std::is_sorted(reported.begin(), reported.end()));
 }
 
 /// `first` s of one travel, then `second` s of another.

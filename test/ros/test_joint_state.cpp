@@ -95,7 +95,7 @@ TEST(JointState, TheSimulatorNamesOnlyWhatIsMeasured) {
   EXPECT_EQ(of(values, record::Channel::acceleration), -120);
 }
 
-TEST(JointStateReader, TellsTheJointsOfAMessageApart) {
+TEST(JointStateReader, DistinguishesTheJointsOfAMessage) {
   JointStateReader reader(
       {record::usual_channels("elbow"), record::usual_channels("wrist"), record::usual_channels("knee")});
   sensor_msgs::JointState m;

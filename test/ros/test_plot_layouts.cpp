@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What config/plotjuggler.xml and doc/plots.md tell plotting programs to show is what the nodes publish: each
+// What config/plotjuggler.xml and doc/plots.md make plotting programs show is what the nodes publish: each
 // name is looked up in the definitions of the messages, as these programs do.
 #include <backlash_diagnosis/AmplitudeDistribution.h>
 #include <backlash_diagnosis/BacklashEstimate.h>

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""three_joints.launch: one diagnoser tells three joints apart that one simulator moves."""
+"""three_joints.launch: one diagnoser distinguishes three joints that one simulator moves."""
 import unittest
 
 import rospy

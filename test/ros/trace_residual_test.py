@@ -103,7 +103,7 @@ class TraceResidualTest(unittest.TestCase):
         self.assertFalse(result.success)
         self.assertFalse(os.path.exists(self.path("cancelled")))
 
-    def test_a_job_that_is_killed_is_told_and_the_node_goes_on(self):
+    def test_a_job_that_is_killed_is_reported_and_the_node_goes_on(self):
         first = threading.Event()
         self.client.send_goal(self.goal(out=self.path("killed")), feedback_cb=lambda f: f.fraction > 0 and first.set())
         self.assertTrue(first.wait(TIMEOUT))

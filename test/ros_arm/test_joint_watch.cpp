@@ -95,7 +95,7 @@ WatchSettings settings(const ScratchFolder& folder) {
   return s;
 }
 
-TEST(JointWatch, LearnsThenTellsAChangeAndRemembersIt) {
+TEST(JointWatch, LearnsThenReportsAChangeAndRemembersIt) {
   const ScratchFolder folder;
   Robot robot(settings(folder));
   EXPECT_NE(robot.watch.state().why_not.find("being learned, 0 of 120 s"), std::string::npos);
@@ -111,7 +111,7 @@ TEST(JointWatch, LearnsThenTellsAChangeAndRemembersIt) {
   EXPECT_EQ(robot.news[0].found.effect, "motor_coulomb");
   EXPECT_LE(robot.news[0].found.since_from, since);
   EXPECT_GE(robot.news[0].found.since_to, since);
-  // A node that starts again knows the machine and what was told.
+  // A node that starts again knows the machine and what was reported.
   Robot again(settings(folder));
   ASSERT_EQ(again.watch.state().changes.size(), 1u);
   EXPECT_EQ(again.watch.state().changes[0].state, diagnosis::ChangeState::standing);
@@ -140,7 +140,7 @@ TEST(JointWatch, PausesJumpsAndLostMessagesAreNoChange) {
   EXPECT_TRUE(robot.watch.state().different.empty());
 }
 
-TEST(JointWatch, SaysWhyItCannotTell) {
+TEST(JointWatch, SaysWhyThereIsNoAnswer) {
   const ScratchFolder folder;
   Robot at_rest(settings(folder));
   at_rest.rest(160);
@@ -196,7 +196,7 @@ void play(const arm::ArmRecord& record, record::Channel channel, double start, J
   }
 }
 
-// Two joints of the same arm change at once: each is told of its own joint.
+// Two joints of the same arm change at once: each is reported of its own joint.
 TEST(JointWatch, AnArmIsWatchedAsOneMachine) {
   const ScratchFolder folder;
   const test::Machine machine(4);
@@ -218,13 +218,13 @@ TEST(JointWatch, AnArmIsWatchedAsOneMachine) {
   EXPECT_TRUE(std::filesystem::exists(s.learned)) << watch.state().why_not;
   EXPECT_TRUE(news.empty());
   play(machine.record(42, 75, worn, 25), machine.declared.channel, 62, watch, news);
-  std::set<std::string> told;
+  std::set<std::string> reported;
   for (const diagnosis::KnownChange& change : watch.state().changes) {
-    told.insert(change.found.joint + " " + change.found.effect);
+    reported.insert(change.found.joint + " " + change.found.effect);
     EXPECT_LE(change.found.since_from, kStart + 87);
     EXPECT_GE(change.found.since_to, kStart + 87);
   }
-  EXPECT_EQ(told, (std::set<std::string>{"elbow_joint motor_coulomb", "wrist_1_joint motor_coulomb"}))
+  EXPECT_EQ(reported, (std::set<std::string>{"elbow_joint motor_coulomb", "wrist_1_joint motor_coulomb"}))
       << watch.state().why_not;
   const std::vector<diagnosis::KnownChange> restored = JointWatch(s).state().changes;
   ASSERT_EQ(restored.size(), 2U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The share that a regression foretells, against signals whose share is known from how they are made.
+// The share that a regression predicts, against signals whose share is known from how they are made.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,7 +30,7 @@ TEST(HatFunctions, AddUpToOneAndFollowEachLine) {
   const Eigen::MatrixXd hats = hat_functions(x, 9);
   ASSERT_EQ(hats.cols(), 9);
   EXPECT_NEAR((hats.rowwise().sum() - Eigen::VectorXd::Ones(kSamples)).cwiseAbs().maxCoeff(), 0, 1e-12);
-  EXPECT_EQ(hat_functions(std::vector<double>(100, 2.0), 9).cols(), 0);  // a constant tells nothing
+  EXPECT_EQ(hat_functions(std::vector<double>(100, 2.0), 9).cols(), 0);  // a constant has no effect
 }
 
 // y = x^2 + noise: of the square of y the part E[x^4] = 1/5 is a function of x.
@@ -66,7 +66,7 @@ TEST(PredictedShare, IsNothingOfNoiseWhateverItsColour) {
   }
 }
 
-// Where few values are independent, something always seems to be foretold: the share by chance says so.
+// Where few values are independent, something always seems to be predicted: the share by chance says so.
 TEST(PredictedShare, IsSeldomBeyondChanceOfShortColouredNoise) {
   int beyond = 0;
   const int trials = 60;
@@ -84,7 +84,7 @@ TEST(PredictedShare, IsSeldomBeyondChanceOfShortColouredNoise) {
   EXPECT_LE(beyond, 6);  // binomial: 1.5 of 60 are expected, 7 or more have a chance below 0.1 %
 }
 
-// What only one block shows cannot be foretold from the others.
+// What only one block shows cannot be predicted from the others.
 TEST(PredictedShare, IsNothingOfWhatHappensOnce) {
   std::vector<double> time;
   Eigen::VectorXd y = Eigen::VectorXd::Zero(kSamples);

@@ -62,7 +62,7 @@ TEST(LeastSquares, StandardErrorsMatchTheScatter) {
   EXPECT_NEAR(sum / stated, 1, 0.31);
 }
 
-TEST(LeastSquares, RefusesWhatCannotBeTold) {
+TEST(LeastSquares, RefusesWhatIsNotDetermined) {
   Eigen::MatrixXd twice(5, 2);
   twice << 1, 2, 2, 4, 3, 6, 4, 8, 5, 10;
   EXPECT_THROW(fit_linear(twice, Eigen::VectorXd::Ones(5)), CannotIdentify);

@@ -56,7 +56,7 @@ TEST(LinearAlgebra, SolvesASquareThatIsNotSymmetricAndNeedsAPivot) {
   EXPECT_LT(distance(x, matrix(2, 1, {1, 2})), 1e-15);
 }
 
-TEST(LinearAlgebra, SmallestPivotTellsADirectionThatIsNotHeld) {
+TEST(LinearAlgebra, SmallestPivotShowsADirectionThatIsNotHeld) {
   // diag 4, then 3 - 2^2 / 4 = 2
   EXPECT_NEAR(smallest_pivot(matrix(2, 2, {4, 2, 2, 3})), 2, 1e-15);
   EXPECT_NEAR(smallest_pivot(matrix(2, 2, {1, 1, 1, 1})), 0, 1e-15);

@@ -54,7 +54,7 @@ TEST(EstimateNoise, OfASinglePeriodOnlyABound) {
 }
 
 TEST(EstimateNoise, WithoutNoise) {
-  // The ringing has 20 samples per cycle: only the differences between periods, which vanish, tell that it is
+  // The ringing has 20 samples per cycle: only the differences between periods, which vanish, show that it is
   // no noise.
   EXPECT_LT(estimate_noise(sample(kWaves[6].second, 20, 200).value, 200).upper, 1e-12);
 }
@@ -95,7 +95,7 @@ TEST(EstimateNoise, ChaoticRingingIsNoNoise) {
     }
 }
 
-TEST(EstimateNoise, TooLittleToTell) {
+TEST(EstimateNoise, TooShortForAnEstimate) {
   EXPECT_TRUE(std::isnan(estimate_noise({}, 100).upper));
   EXPECT_TRUE(std::isnan(estimate_noise(std::vector<double>(9, 1.0), 100).upper));
   const Signal signal = sample(kWaves[0].second, 3, 100, 0.1);

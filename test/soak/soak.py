@@ -45,7 +45,7 @@ def robust_slope(times, values):
 
 
 class Listener:
-    """What the nodes tell on their topics."""
+    """What the nodes report on their topics."""
 
     def __init__(self):
         import rospy

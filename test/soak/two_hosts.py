@@ -69,7 +69,7 @@ class Hosts:
 
 
 def status(m):
-    """All that /diagnostics tells in its next few messages, as text."""
+    """All that /diagnostics reports in its next few messages, as text."""
     return m.run("desk", "timeout", "4", "rostopic", "echo", "/diagnostics", check=False)
 
 
@@ -86,7 +86,7 @@ def until(m, condition, what, patience=machine.PATIENCE):
         if condition(text):
             return text, time.monotonic() - start
         if time.monotonic() - start > patience:
-            raise TimeoutError("%s was not told within %g s: %s" % (what, patience, text[-3000:]))
+            raise TimeoutError("%s was not lost_time within %g s: %s" % (what, patience, text[-3000:]))
 
 
 def ask(m):
@@ -122,7 +122,7 @@ def trial(m, hosts, cuts):
 
 
 def cut_rows(m, hosts, seconds):
-    """Cuts the link for so long: both that and what was lost by it must be told."""
+    """Cuts the link for so long: both that and what was lost by it must be reported."""
     before = status(m)
     hosts.cut(True)
     start = time.monotonic()
@@ -138,9 +138,9 @@ def cut_rows(m, hosts, seconds):
                        "the samples after the cut")
     # What is under way when the two counters are read, some 2 s of it, is no loss.
     unknown = count(text, "samples published") - count(text, "Samples accepted") - lost(text, before)
-    told = re.findall(r"stamps jumped forward by \S+ s", text)
+    lost_time = re.findall(r"stamps jumped forward by \S+ s", text)
     rows.append(("after %.0f s without link" % lasted, "samples again and up to date %.0f s later; %s" % (
-        took, told[-1] if count(text, "Clock jumps") > count(before, "Clock jumps") else "none lost"),
+        took, lost_time[-1] if count(text, "Clock jumps") > count(before, "Clock jumps") else "none lost"),
         abs(unknown) < 3 * RATE))
     return rows
 
@@ -149,8 +149,8 @@ def lost(text, before):
     """Samples that the diagnoser says to have missed since."""
     if count(text, "Clock jumps") == count(before, "Clock jumps"):
         return 0
-    told = re.findall(r"stamps jumped forward by (\S+) s", text)
-    return float(told[-1]) * RATE if told else 0
+    lost_time = re.findall(r"stamps jumped forward by (\S+) s", text)
+    return float(lost_time[-1]) * RATE if lost_time else 0
 
 
 def main():

@@ -234,7 +234,7 @@ TEST(BuildCurve, RefusesWhatItCannotBuild) {
   }
 }
 
-TEST(CheckCurve, AnotherVersionIsToldAnotherGeometryIsRefused) {
+TEST(CheckCurve, AnotherVersionIsReportedAnotherGeometryIsRefused) {
   const rig_file::RigFile file = rig_file::default_rig_file();
   diagnosis::MonitoringCurve curve;
   curve.backlash_to_angle = 1 / 0.014917;  // the base radius of the default rig

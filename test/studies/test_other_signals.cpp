@@ -59,7 +59,7 @@ diagnosis::Estimate by_skewness(const rig_file::RigFile& file, const diagnosis::
 // The gear's acceleration rings at 2.8 kHz behind the stiff output coupling, and its skewness has a dip at 50
 // um: the curve needs a grid that shows it, and most intervals span branches. What they claim must be true
 // all the same.
-TEST(OtherSignals, AccelerationTellsBacklashOrSaysThatItCannot) {
+TEST(OtherSignals, AccelerationShowsBacklashOrIsRefused) {
   const rig_file::RigFile file = rig("acceleration: {noise: 5}", "acceleration", "1500");
   CurveRequest request = coarse();
   request.points = 21;
@@ -84,7 +84,7 @@ TEST(OtherSignals, AccelerationTellsBacklashOrSaysThatItCannot) {
   EXPECT_GE(informative, 4);  // of 60 values in a separate run 41 were, and none was wrong
 }
 
-TEST(OtherSignals, ACommandedCurrentTellsNothing) {
+TEST(OtherSignals, ACommandedCurrentHasNoAnswer) {
   const rig_file::RigFile file =
       rig("motor_current: {noise: 0.01}", "motor_current", "5", "torque_constant: 0.02");
   const diagnosis::MonitoringCurve curve = build_curve(file, coarse());

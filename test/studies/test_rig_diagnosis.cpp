@@ -99,7 +99,7 @@ TEST(RigDiagnosis, IntervalsHoldTheTruth) {
         EXPECT_LE(e.lower - slack, 2 * half_gap) << e.method << ' ' << half_gap;
         EXPECT_GE(e.upper + slack, 2 * half_gap) << e.method << ' ' << half_gap;
       }
-      // The motor's own travel tells the play to the rig's ringing; 3 um as the records of the separate
+      // The motor's own travel shows the play to the rig's ringing; 3 um as the records of the separate
       // program.
       ASSERT_GE(d.verdict.estimate, 0) << half_gap << ": " << d.verdict.message;
       EXPECT_NEAR(d.estimates[d.verdict.estimate].backlash, 2 * half_gap, 3e-6) << d.verdict.message;
@@ -147,7 +147,7 @@ struct Variant {
   std::string name;
   Change change;
   std::string reason;          // with all channels
-  std::string without_torque;  // the reason without motor_torque; empty: cannot be told
+  std::string without_torque;  // the reason without motor_torque; empty: no check of it
   std::string
       without_position;  // without motor_position and load_position, but with motor_torque; empty likewise
 };

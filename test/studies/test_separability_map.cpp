@@ -48,7 +48,7 @@ Separability mapped(const std::vector<Disturbance>& disturbances) {
   return map_separability(rig_file::default_rig_file(), curve(), disturbances, quick());
 }
 
-int told(const SeparabilityAnswer& a) {
+int answered(const SeparabilityAnswer& a) {
   return a.right + a.wrong;
 }
 
@@ -98,7 +98,7 @@ TEST(SeparabilityMap, ALoadIsHiddenFromMotorTorqueButNotFromTheSensor) {
   // A load of 60 % shifts the level at the sensor by as much, far beyond what the checks of the signal allow.
   const Separability all = mapped({disturbance("load_torque", {0, 0.6})});
   for (const SeparabilityCell& cell : all.maps[0].cells[1]) {
-    EXPECT_EQ(told(cell.answers[0]), 0);
+    EXPECT_EQ(answered(cell.answers[0]), 0);
     EXPECT_EQ(cell.answers[0].reason.find("excitation"), std::string::npos) << cell.answers[0].reason;
   }
 }

@@ -36,7 +36,7 @@ TEST(SummariseStudy, CountsByHand) {
   const std::vector<StudyRow> rows = summarise_study(trials, true, 30e-6);
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0].trials, 4);
-  EXPECT_EQ(rows[0].told, 3);
+  EXPECT_EQ(rows[0].answered, 3);
   EXPECT_NEAR(rows[0].median_error, 3e-6, 1e-12);
   EXPECT_NEAR(rows[0].p95_error, 18.3e-6, 1e-12);  // of 1, 3 and 20 um at place 0.95 * 2: 3 + 0.9 * 17
   EXPECT_NEAR(rows[0].median_width, 3e-6, 1e-12);
@@ -85,8 +85,8 @@ TEST(UncertaintyStudy, IntervalsHoldWhatTheyPromise) {
     for (const StudyRow& row : summarise_study(trials, position, 70e-6)) {
       EXPECT_EQ(row.wrong_and_sure, 0) << row.method;
       // Of 30 to 48 intervals of 95 % more than 7 miss with a probability below 1 %.
-      if (row.told > 0) {
-        EXPECT_LE((1 - row.coverage) * row.told, 7.001) << row.method;
+      if (row.answered > 0) {
+        EXPECT_LE((1 - row.coverage) * row.answered, 7.001) << row.method;
       }
     }
   // The goals are 1 um with position and 6 um from torque alone, in the median at 2 % noise; here at all

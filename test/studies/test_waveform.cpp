@@ -159,7 +159,7 @@ TEST(Waveform, FreeLink) {
     const record::Record record = record_of(file);
     const Estimate both = diagnosis::estimate_waveform(record, settings);
     expect_holds(both, backlash);
-    EXPECT_NEAR(both.backlash, backlash, 0.02 * backlash);  // a sixth of what torque alone tells
+    EXPECT_NEAR(both.backlash, backlash, 0.02 * backlash);  // a sixth of what torque alone gives
     const Estimate alone = diagnosis::estimate_waveform(without_position(record), settings);
     expect_holds(alone, backlash);
     EXPECT_LT(alone.upper - alone.lower, 0.62 * alone.backlash);  // of a locked output: 0.3
@@ -236,19 +236,19 @@ TEST(Waveform, AnEarlierAnswerEndsWithTheMachineItIsOf) {
     earlier.end = 0.9;
     earlier.estimate.status = Status::ok;
     earlier.period = diagnosis::mean_period(part(0.2));
-    const auto told = [&](diagnosis::PeriodWindow window) {
+    const auto estimated = [&](diagnosis::PeriodWindow window) {
       window.record = without_position(window.record);
       diagnosis::Diagnosis now = diagnosis::diagnose(window, quick, nullptr);
       diagnosis::recall(now, earlier, window, std::nullopt, std::nullopt);
       return now.estimates.back();
     };
     for (double start = 0.5; start < 4.5; start += 0.3)
-      EXPECT_EQ(told(part(start)).status, Status::ok) << told(part(start)).message;
+      EXPECT_EQ(estimated(part(start)).status, Status::ok) << estimated(part(start)).message;
     for (const double factor : {0.5, 0.8, 0.9, 1.1, 1.3, 2.0}) {
       if (backlash > 120e-6 && std::fabs(factor - 1) < 0.15) continue;
       file.rig.mesh.backlash = factor * backlash;
       const record::Record changed = simulation::simulate_record(file.rig, file.simulation, 5.2);
-      EXPECT_EQ(told(window_of(changed.slice(4.2 - 1e-6, 4.9 - 1e-6))).status, Status::insufficient_data)
+      EXPECT_EQ(estimated(window_of(changed.slice(4.2 - 1e-6, 4.9 - 1e-6))).status, Status::insufficient_data)
           << factor << " of " << backlash;
     }
   }
@@ -270,7 +270,7 @@ TEST(Waveform, ShowsTheRecordAndTheFittedMachine) {
       EXPECT_EQ(window.position.measured[i], record.column(Channel::motor_position)[first + i]);
       squares += std::pow(window.torque.measured[i] - window.torque.model[i], 2);
     }
-    // 0.002 N m of noise were added, and some hundred samples tell it to a tenth.
+    // 0.002 N m of noise were added, and some hundred samples determine it to a tenth.
     const double rms = std::sqrt(squares / static_cast<double>(window.torque.measured.size()));
     EXPECT_NEAR(rms, 0.002, 0.0006);
   }
@@ -319,8 +319,9 @@ TEST(Waveform, OnlyRigsThatItsEquationsDescribe) {
     EXPECT_FALSE(rig_file::load_rig_file(test::package_file(rig)).diagnosis.waveform) << rig;
 }
 
-/// The new machine is told by its record, then the worn one by the torque alone. By the symmetry the scale
-/// stays as uncertain as what was known of it, growth does not: 2 %, the goal, is several times the noise.
+/// The new machine is known from its record, then the worn one from the torque alone. By the symmetry the
+/// scale stays as uncertain as what was known of it, growth does not: 2 %, the goal, is several times the
+/// noise.
 TEST(Waveform, CommissionedWhenNewFromTorqueAlone) {
   const double fresh = 25e-6, worn = 90e-6;
   const auto first =
@@ -331,10 +332,10 @@ TEST(Waveform, CommissionedWhenNewFromTorqueAlone) {
   expect_holds(e, worn);
   EXPECT_NEAR(e.backlash / first.states[0].backlash, worn / fresh, 0.02 * worn / fresh);
   EXPECT_GT(e.upper - e.lower, 0.15 * worn);  // never sure of the scale
-  const auto told = diagnosis::commission_waveform({without_position(record_of(drawn(31, fresh)))},
-                                                   declared(), fresh, 0.01);
+  const auto commissioned = diagnosis::commission_waveform({without_position(record_of(drawn(31, fresh)))},
+                                                           declared(), fresh, 0.01);
   const Estimate absolute =
-      diagnosis::estimate_waveform(without_position(record_of(drawn(31, worn))), told.machine);
+      diagnosis::estimate_waveform(without_position(record_of(drawn(31, worn))), commissioned.machine);
   expect_holds(absolute, worn);
   EXPECT_NEAR(absolute.backlash, worn, 0.02 * worn);
   // 2.3 errors to either side, of 1 % that is known of the first play and as much of the values beside it.

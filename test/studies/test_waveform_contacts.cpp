@@ -59,7 +59,7 @@ record::Record without_position(record::Record record) {
   return record;
 }
 
-void expect_told(const rig_file::RigFile& declared, double backlash, double largest_error) {
+void expect_play(const rig_file::RigFile& declared, double backlash, double largest_error) {
   ASSERT_TRUE(declared.diagnosis.waveform);
   const record::Record record = record_of(off(declared, backlash));
   for (const bool position : {true, false}) {
@@ -81,14 +81,14 @@ TEST(WaveformContacts, FittedRigOfThePaper) {
   const auto file = rig_file::load_rig_file(test::package_file("config/sarkar_1997_fitted.yaml"));
   ASSERT_TRUE(file.diagnosis.waveform);
   EXPECT_EQ(file.diagnosis.waveform->contact_exponent, 1.362);
-  expect_told(file, 80e-6, 0.6e-6);  // what the interval promises at least
+  expect_play(file, 80e-6, 0.6e-6);  // what the interval promises at least
 }
 
 TEST(WaveformContacts, SpringAndDamper) {
-  expect_told(with_contact("    contact: {law: linear, stiffness: 8.0e+5, damping: 60}\n"), 50e-6, 0.6e-6);
+  expect_play(with_contact("    contact: {law: linear, stiffness: 8.0e+5, damping: 60}\n"), 50e-6, 0.6e-6);
 }
 
-/// Teeth without any loss ring on and on, and windows are hard to start: told right or not at all.
+/// Teeth without any loss ring on and on, and windows are hard to start: estimated right or not at all.
 TEST(WaveformContacts, NoLossAtAll) {
   const auto file = with_contact("    contact: {law: power_law, stiffness: 1.0e+7, exponent: 1.2}\n");
   ASSERT_TRUE(file.diagnosis.waveform);
@@ -106,7 +106,7 @@ TEST(WaveformContacts, MeshOfAngles) {
                               "    contact: {law: linear, stiffness: 180, damping: 0.013}\n");
   text = replaced(text, "  apd:", "  lost_motion:", "");
   text = replaced(text, "    backlash:\n", "      watch", "    backlash_angle:\n");
-  expect_told(rig_file::rig_file_from_text(text, "angles.yaml"), 4e-3, 4e-5);
+  expect_play(rig_file::rig_file_from_text(text, "angles.yaml"), 4e-3, 4e-5);
 }
 
 /// Teeth that are a spring and a damper beside those that are declared after Hertz: whatever the values, the
@@ -131,10 +131,10 @@ TEST(WaveformContacts, CommissionedDamperIsWritten) {
   const auto found = diagnosis::commission_waveform({record_of(machine)}, *declared.diagnosis.waveform);
   const rig_file::RigFile again =
       rig_file::rig_file_from_text(rig_file::commissioned_text(declared, found, "a test"), "again.yaml");
-  const diagnosis::WaveformSettings &told = *again.diagnosis.waveform, &fit = found.machine;
-  EXPECT_NEAR(told.contact_damping, fit.contact_damping, 1e-5 * fit.contact_damping);  // digits of the file
-  EXPECT_NEAR(told.spread.contact_damping, fit.spread.contact_damping, 1e-2 * fit.spread.contact_damping);
-  EXPECT_NEAR(std::log(told.contact_stiffness / 8e5), std::log(1.6), 3 * told.spread.contact_stiffness);
+  const diagnosis::WaveformSettings &read = *again.diagnosis.waveform, &fit = found.machine;
+  EXPECT_NEAR(read.contact_damping, fit.contact_damping, 1e-5 * fit.contact_damping);  // digits of the file
+  EXPECT_NEAR(read.spread.contact_damping, fit.spread.contact_damping, 1e-2 * fit.spread.contact_damping);
+  EXPECT_NEAR(std::log(read.contact_stiffness / 8e5), std::log(1.6), 3 * read.spread.contact_stiffness);
   EXPECT_NEAR(again.rig.mesh.backlash, 50e-6, 0.6e-6);
 }
 

@@ -18,7 +18,7 @@ namespace backlash::test {
 
 /// A change of a machine, and of what its sensors show.
 struct RigEvent {
-  std::string name;   // of the value that it moves, as detect_changes should tell it
+  std::string name;   // of the value that it moves, as detect_changes should name it
   double share = 0;   // of the value, but of motor_coulomb: of the drive's amplitude
   double span = 0;    // s, over which it grows; 0: at once
   bool named = true;  // whether one value of the machine is another

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Opens pages in a headless Chromium and tells, as JSON, what is there to be seen; who calls it judges.
+"""Opens pages in a headless Chromium and reports, as JSON, what is there to be seen; who calls it judges.
 
 usage: look_at_pages.py PAGE.html... [--screenshots DIR]
 

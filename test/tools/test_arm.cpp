@@ -28,7 +28,7 @@ const char* const kJoints[] = {"shoulder_pan_joint", "shoulder_lift_joint", "elb
                                "wrist_1_joint",      "wrist_2_joint",       "wrist_3_joint"};
 
 // Somewhat above what doc/measured/ur10e_arm.md has.
-TEST_F(Arm, ForetellsATrajectoryThatItHasNotSeen) {
+TEST_F(Arm, PredictsATrajectoryThatItHasNotSeen) {
   done("identify a.csv b.csv --rig rig/ur10e_arm.yaml --out fitted.yaml --json fit.json");
   const Json fit = json("fit.json");
   for (const auto& [name, link] : fit.at("links").items()) EXPECT_TRUE(link.at("consistent")) << name;
@@ -90,7 +90,7 @@ TEST_F(Arm, NamesAPayloadThatNothingDeclares) {
   EXPECT_TRUE(std::filesystem::exists(path("out/report.html")));
 }
 
-TEST_F(Arm, TellsAPushWhileItHoldsItsPose) {
+TEST_F(Arm, FindsAPushWhileItHoldsItsPose) {
   done("trace_residual --rig rig/ur10e_arm.yaml --train free.csv --test push.csv --out out");
   const Json steps = json("out/report.json").at("steps");
   ASSERT_GT(steps.size(), 4u);

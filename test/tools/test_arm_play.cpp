@@ -70,7 +70,7 @@ std::string without(const std::string& csv, const std::string& column) {
   return out;
 }
 
-TEST_F(ArmPlay, AJointWithTheMotorsEncoderAloneIsToldBesideOneWithTwo) {
+TEST_F(ArmPlay, AJointWithTheMotorsEncoderAloneIsEstimatedBesideOneWithTwo) {
   done("simulate rig/two_link_arm.yaml --duration 20 --out both.csv");
   write("one.csv", without(read("both.csv"), "elbow/load_position"));
   const Outcome outcome = run("diagnose_record one.csv --rig rig/two_link_arm.yaml --json out.json");

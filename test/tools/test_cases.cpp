@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Records of machines as people report them, with the answers that are known to be right (the README beside
 // each).
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "support/data.h"
@@ -42,6 +43,67 @@ TEST_F(Cases, OneFlankOfAMachineOfAnotherKindHasNoPlay) {
   EXPECT_EQ(outcome.code, 3) << outcome.err;
   EXPECT_TRUE(json("x.json")["parameters"]["backlash_angle"]["standard_error"].is_null());
   EXPECT_EQ(read("f.yaml"), content(folder + "/rig.yaml"));
+}
+
+// Friction that may wander follows the brake, and is off before it began at 82.55 s: that is no change.
+TEST_F(Cases, ABrakeThatDragsNowAndThenBeginsWhereItBegins) {
+  SKIP_WITHOUT("D16_unknown_since_too_early");
+  const std::string folder = file("D16_unknown_since_too_early");
+  for (const std::string name : {"h1", "h2", "record"})
+    ASSERT_EQ(shell("gunzip -c " + folder + "/" + name + ".csv.gz | cat >" + name + ".csv; true").code, 0);
+  EXPECT_EQ(
+      run("detect_changes record.csv --rig " + folder + "/rig.yaml --healthy h1.csv h2.csv --json x.json")
+          .code,
+      2);
+  const Json report = json("x.json");
+  ASSERT_EQ(report["changes"].size(), 1u);
+  EXPECT_LE(report["changes"][0]["since_interval"][0].get<double>(), 82.55);
+  EXPECT_GE(report["changes"][0]["since_interval"][1].get<double>(), 82.55);
+}
+
+// 0.5 % of the cells without a number, and an encoder that is read at a quarter of the rate: the machine of
+// truth.json is found as in the whole record.
+TEST_F(Cases, CellsWithoutANumberAndHeldValuesDoNotCount) {
+  const std::string folder = find_data("robot_joints/servo_00").value_or("");
+  if (folder.empty()) GTEST_SKIP() << "robot_joints is not there";
+  const double truth = Json::parse(content(folder + "/truth.json"))["backlash_angle"];
+  for (const std::string spoil : {"NR > 1 && NR % 200 == 7 { $(2 + NR % 3) = \"nan\" } 1",
+                                  "NR > 1 { if (NR % 4) $4 = held; held = $4 } 1"}) {
+    ASSERT_EQ(shell("awk -F, -v OFS=, '" + spoil + "' " + folder + "/m0.csv > a.csv && true").code, 0);
+    const Outcome outcome = run("diagnose_record a.csv --rig " + folder + "/rig.yaml --json x.json");
+    const Json interval = json("x.json")["verdict"]["angle_interval"];
+    ASSERT_FALSE(interval.is_null()) << outcome.out << outcome.err;
+    EXPECT_LE(interval[0].get<double>(), truth) << spoil;
+    EXPECT_GE(interval[1].get<double>(), truth) << spoil;
+    EXPECT_LT(interval[1].get<double>() - interval[0].get<double>(), 0.25 * truth) << spoil;
+  }
+}
+
+// Machines of another simulator, with seconds missing: the parts before and after are fitted together. Three
+// standard errors: one of 300 values is farther off by chance.
+TEST_F(Cases, ALongGapCutsARecordWhosePartsShareTheValues) {
+  struct Machine {
+    std::string record, gap, rig;
+    std::map<std::string, double> truth;
+  };
+  for (const Machine& m : {Machine{"one_encoder/joint1",
+                                   "$1 < 30 || $1 > 33",
+                                   "ur5_joint",
+                                   {{"inertia", 0.879872}, {"coulomb", 0.505244}}},
+                           Machine{"undeclared/dev1",
+                                   "$1 < 12 || $1 > 12.5",
+                                   "two_inertia_servo",
+                                   {{"backlash_angle", 5.741958e-4}, {"load_inertia", 85.03168}}}}) {
+    const auto record = find_data(m.record + "/train.csv");
+    if (!record) GTEST_SKIP() << m.record << " is not there";
+    ASSERT_EQ(shell("awk -F, 'NR == 1 || " + m.gap + "' " + *record + " > a.csv && true").code, 0);
+    done("identify a.csv --rig " + package_file("config/" + m.rig + ".yaml") + " --out f.yaml --json x.json");
+    const Json found = json("x.json")["parameters"];
+    for (const auto& [name, truth] : m.truth)
+      EXPECT_NEAR(found[name]["value"].get<double>(), truth, 3 * found[name]["standard_error"].get<double>())
+          << name;
+    EXPECT_NE(json("x.json")["warnings"].dump().find("cut at 1 gap of more than"), std::string::npos);
+  }
 }
 
 TEST_F(Cases, DeclaredGravityCounts) {

@@ -67,6 +67,18 @@ TEST_F(CheckRecord, NeedsNoRigFileAndNoOutput) {
   EXPECT_NE(outcome.out.find("identify: yes"), std::string::npos) << outcome.out;
 }
 
+// A vector picture has its texts as comments. Seconds 2 to 3 of the load's encoder stand still.
+TEST_F(CheckRecord, PlotShowsWhatIsWrongAtItsPlace) {
+  simulate("NR > 1 && $1 >= 2 && $1 < 3 { $5 = held } { held = $5 } 1");
+  EXPECT_EQ(look("--plot x.svg").code, 1);
+  const std::string picture = read("x.svg");
+  for (const char* text : {"torque [N m]", "position [rad]", "difference [rad]", "time [s]", "a.csv"})
+    EXPECT_NE(picture.find("<!-- " + std::string(text) + " -->"), std::string::npos) << text;
+  EXPECT_NE(picture.find("1  frozen (cut): load_position: stands still from 1.999 s to 2.999 s"),
+            std::string::npos);
+  EXPECT_EQ(run("check_record a.csv --plot x.txt").code, 64);
+}
+
 TEST_F(CheckRecord, EndsWith3WhereNothingCanUseIt) {
   simulate("NR > 1 { $2 = 0 } 1");  // of the column of motor_torque
   const test::Outcome outcome = look();

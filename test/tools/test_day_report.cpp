@@ -55,12 +55,12 @@ class DayReport : public CommandTest {
   }
 };
 
-TEST_F(DayReport, ADayWithoutAChangeIsToldAsSuch) {
+TEST_F(DayReport, ADayWithoutAChangeIsReportedAsSuch) {
   history("elbow", "good", 0.5);
-  const Json told = day(0);
-  EXPECT_EQ(told["to"], kNoon);
-  EXPECT_EQ(told["joints"].size(), 1u);
-  const Json& elbow = told["joints"][0];
+  const Json page = day(0);
+  EXPECT_EQ(page["to"], kNoon);
+  EXPECT_EQ(page["joints"].size(), 1u);
+  const Json& elbow = page["joints"][0];
   EXPECT_EQ(elbow["joint"], "elbow");
   EXPECT_EQ(elbow["told"], 25);  // of the last day alone, both ends among them
   EXPECT_EQ(elbow["series"][0]["time"], kNoon - 24 * kHour);
@@ -69,26 +69,26 @@ TEST_F(DayReport, ADayWithoutAChangeIsToldAsSuch) {
   EXPECT_EQ(day(0, "--hours 2 --until 2027-01-01T06:30:00Z")["joints"][0]["told"], 2);
 }
 
-TEST_F(DayReport, ChangesOfTheDayAreTold) {
+TEST_F(DayReport, ChangesOfTheDayAreReported) {
   history("elbow", "good", 0.5);
   history("wrist", "watch", 0.8);
   EXPECT_EQ(day(1)["joints"].size(), 2u);
   change("wrist", -5, diagnosis::ChangeState::standing);
   change("elbow", -6, diagnosis::ChangeState::withdrawn);
-  const Json told = day(2);
-  EXPECT_TRUE(told["joints"][0]["changes"].empty());
-  EXPECT_EQ(told["joints"][1]["changes"][0]["since"], kNoon - 5 * kHour);
-  expect_contains(told["summary"].get<std::string>(), "wrist: backlash since 2027-01-01T07:00:00Z");
+  const Json page = day(2);
+  EXPECT_TRUE(page["joints"][0]["changes"].empty());
+  EXPECT_EQ(page["joints"][1]["changes"][0]["since"], kNoon - 5 * kHour);
+  expect_contains(page["summary"].get<std::string>(), "wrist: backlash since 2027-01-01T07:00:00Z");
   expect_contains(read("day.html"), "backlash since 2027-01-01T07:00:00Z");
   // It began after that day.
   EXPECT_EQ(day(1, "--until 2027-01-01T06:00:00Z")["joints"][1]["changes"].size(), 0u);
 }
 
-TEST_F(DayReport, AJointOfWhichNothingCanBeToldIsCounted) {
+TEST_F(DayReport, AJointWithoutAnAnswerIsCounted) {
   history("elbow", "cannot_tell", std::nan(""));
-  const Json told = day(3);
-  EXPECT_EQ(told["joints"][0]["told"], 0);
-  expect_contains(told["summary"].get<std::string>(), "of 1 no estimate told the play");
+  const Json page = day(3);
+  EXPECT_EQ(page["joints"][0]["told"], 0);
+  expect_contains(page["summary"].get<std::string>(), "of 1 no estimate states the play");
 }
 
 /// A folder that nobody writes any more is not reported as today's.

@@ -31,7 +31,7 @@ class DetectChanges : public CommandTest {
   }
 };
 
-TEST_F(DetectChanges, TellsEachChangeOfTheSharedRecordsAndNothingElse) {
+TEST_F(DetectChanges, FindsEachChangeOfTheSharedRecordsAndNothingElse) {
   const auto truth_file = find_data("changes/truth.json");
   if (!truth_file) GTEST_SKIP() << "changes/truth.json is not there";
   std::ifstream in(*truth_file);
@@ -61,7 +61,7 @@ TEST_F(DetectChanges, TellsEachChangeOfTheSharedRecordsAndNothingElse) {
   }
 }
 
-TEST_F(DetectChanges, TellsSinceWhenAJointOfTwoInertiasHasMorePlay) {
+TEST_F(DetectChanges, FindsSinceWhenAJointOfTwoInertiasHasMorePlay) {
   const std::string rig = package_file("config/simulated_robot/shoulder.yaml");
   const auto simulate = [&](const std::string& more) { return run("simulate " + rig + " " + more).code; };
   ASSERT_EQ(simulate("--duration 200 --seed 1 --out healthy.csv"), 0);
@@ -99,7 +99,7 @@ TEST_F(DetectChanges, AHealthyTaskAgainDiffersByNothing) {
 
 // The forearm of an arm takes up half a kilogram while the gears of its elbow are found to have 5 % more
 // play.
-TEST_F(DetectChanges, TellsWhichJointOfAnArmHasMorePlayAndWhatItCarries) {
+TEST_F(DetectChanges, FindsWhichJointOfAnArmHasMorePlayAndWhatItCarries) {
   const std::string folder = package_file("config/two_link_arm/"), rig = folder + "two_link_arm.yaml";
   write("two_link_arm.urdf", content(folder + "two_link_arm.urdf"));
   std::string text = content(rig);
@@ -131,7 +131,7 @@ TEST_F(DetectChanges, TellsWhichJointOfAnArmHasMorePlayAndWhatItCarries) {
 }
 
 // By eye the push begins at 1.84 s on the first joint; nothing before.
-TEST_F(DetectChanges, TellsAPushOnAMeasuredArmThatHoldsItsPose) {
+TEST_F(DetectChanges, FindsAPushOnAMeasuredArmThatHoldsItsPose) {
   const auto push = find_data("measured/ur5_arm_push.csv"), healthy = find_data("measured/ur5_arm_b.csv");
   if (!push || !healthy) GTEST_SKIP() << "measured/ur5_arm_push.csv is not there";
   const Outcome outcome = run("detect_changes --rig " + package_file("config/ur10e_arm/ur10e_arm.yaml") +

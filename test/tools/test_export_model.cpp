@@ -31,7 +31,7 @@ TEST_F(ExportModel, WritesXmlForEachRigWithAJoint) {
   expect_contains(read("kr300.sdf"), "<model name=\"kr300\">");
 }
 
-TEST_F(ExportModel, TellsWhatTheFileDoesNotSay) {
+TEST_F(ExportModel, SaysWhatTheFileDoesNotHold) {
   const Outcome outcome = run("export_model two_inertia_servo.yaml --out servo.urdf");
   EXPECT_EQ(outcome.code, 0);
   expect_contains(outcome.err,

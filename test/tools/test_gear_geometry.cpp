@@ -72,7 +72,7 @@ TEST_F(GearGeometryCommand, StopOfAHingedBracketAndSensorStep) {
   EXPECT_EQ(json("--table 3 --stop 200e-6" + bracket)["table"].size(), 3u);
 }
 
-TEST_F(GearGeometryCommand, APairThatDoesNotRunIsTold) {
+TEST_F(GearGeometryCommand, APairThatDoesNotRunIsReported) {
   const Outcome outcome = run("gear_geometry --centre-distance-change 620e-6 --json -");
   EXPECT_EQ(outcome.code, 2);
   expect_contains(outcome.err, "contact ratio 0.98");

@@ -107,7 +107,7 @@ TEST_F(Identify, OneInertia) {
                                                                        {"viscous", {203.5, "N s/m"}},
                                                                        {"offset", {-3.2, "N"}}};
   for (const auto& [name, expected] : truth) {
-    // Inertia and friction of a sine are told apart by its harmonics only.
+    // Inertia and friction of a sine are distinguished by its harmonics only.
     EXPECT_NEAR(parameters.at(name).at("value").get<double>() / expected.first, 1, 0.05) << name;
     EXPECT_EQ(parameters.at(name).at("unit"), expected.second);
   }
@@ -172,7 +172,7 @@ TEST_F(OneJoint, WithoutFrictionIsFoundWhateverTheNoiseMakesOfIt) {
   done("simulate fit.yaml --duration 1 --out again.csv");  // a file that can be used
 }
 
-TEST_F(OneJoint, SeveralRecordsTellMoreThanOne) {
+TEST_F(OneJoint, SeveralRecordsShowMoreThanOne) {
   write("more.csv", swing(1.1, 0.6, 0, 0, 0.4, 4));
   EXPECT_EQ(identified(swing(1.1, 0.6, 0, 0)).code, 0);
   const Json one = json("fit.json");

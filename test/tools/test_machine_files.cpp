@@ -78,7 +78,7 @@ TEST_F(MachineFiles, ABaselineMustBeOfThisRig) {
   EXPECT_EQ(diagnosed("worn.csv --rig rig.yaml --save-baseline /nowhere/healthy.yaml").code, 73);
 }
 
-TEST_F(MachineFiles, NoBaselineIsSavedOfWhatCannotBeTold) {
+TEST_F(MachineFiles, NoBaselineIsSavedWithoutAnAnswer) {
   write("still.csv", "time,motor_torque,motor_position\n0,0,0\n0.001,0,0\n0.002,0,0\n");
   const Outcome outcome = diagnosed("still.csv --rig rig.yaml --save-baseline healthy.yaml");
   EXPECT_EQ(outcome.code, 3);

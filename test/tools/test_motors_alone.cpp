@@ -25,8 +25,8 @@ class MotorsAlone : public CommandTest {
   }
 };
 
-// Records of which versions told 0.2 to 0.75 of the play, with nothing but noise left.
-TEST_F(MotorsAlone, ALargePlayIsNotToldAsASmallOne) {
+// Records of which earlier versions reported 0.2 to 0.75 of the play, with nothing but noise left.
+TEST_F(MotorsAlone, ALargePlayIsNotReportedAsASmallOne) {
   for (const auto& [play, seed] : {std::pair{2e-3, 7}, {3e-3, 5}}) {
     const nlohmann::json e = estimate(play, seed);
     EXPECT_TRUE(e.at("status") != "ok" || holds(e, play)) << play << " " << seed << " " << e;
@@ -35,7 +35,7 @@ TEST_F(MotorsAlone, ALargePlayIsNotToldAsASmallOne) {
 
 // Among them some that found a wrong answer or none, as the fit stood still on its way. Of 256 answers on
 // records of other seeds four were more than 4 % off, none more than 8 %.
-TEST_F(MotorsAlone, APlayThatIsNotTheDeclaredOneIsTold) {
+TEST_F(MotorsAlone, APlayThatIsNotTheDeclaredOneIsEstimated) {
   for (const auto& [play, seed] :
        {std::pair{7e-4, 1}, {7e-4, 2}, {1e-3, 1}, {2.2e-4, 20}, {1e-3, 35}, {2e-3, 3}, {2e-3, 8}}) {
     const nlohmann::json e = estimate(play, seed);

@@ -68,12 +68,12 @@ void expect_numbers(const std::string& cell, const Json& value, const Json& inte
     EXPECT_TRUE(shown.empty()) << cell;
     return;
   }
-  std::vector<double> told = {value.get<double>()};
+  std::vector<double> given = {value.get<double>()};
   for (const Json& end : interval)
-    if (end.is_number()) told.push_back(end.get<double>());
-  ASSERT_EQ(shown.size(), told.size()) << cell;
-  for (std::size_t i = 0; i < told.size(); ++i)
-    EXPECT_NEAR(shown[i], told[i] / unit, 5.01 * std::pow(10, -digits) * std::fabs(told[i] / unit)) << cell;
+    if (end.is_number()) given.push_back(end.get<double>());
+  ASSERT_EQ(shown.size(), given.size()) << cell;
+  for (std::size_t i = 0; i < given.size(); ++i)
+    EXPECT_NEAR(shown[i], given[i] / unit, 5.01 * std::pow(10, -digits) * std::fabs(given[i] / unit)) << cell;
 }
 
 void expect_drawn(const Json& page, std::size_t plots) {
@@ -104,11 +104,11 @@ TEST_F(Pages, ADiagnosisInABrowser) {
   const Json seen = looked_at("out.html");
   if (seen.contains("skipped")) GTEST_SKIP() << seen["skipped"].get<std::string>();
   const Json& page = seen.at(0);
-  const Json told = Json::parse(read("out.json"));
+  const Json json = Json::parse(read("out.json"));
   expect_sound(page);
   expect_drawn(page, 8);  // intervals, curve, APD, loop, torque, position; fitted torque and position
   const Json table = table_with(page, {"method", "status"});
-  const Json& estimates = told.at("estimates");
+  const Json& estimates = json.at("estimates");
   ASSERT_EQ(table.size(), estimates.size() + 2);  // heads, and all together
   for (std::size_t i = 0; i < estimates.size(); ++i) {
     const Json &row = table[i + 1], &e = estimates[i];
@@ -116,7 +116,7 @@ TEST_F(Pages, ADiagnosisInABrowser) {
     EXPECT_EQ(row[1], e.at("status"));
     expect_numbers(row[2], e.at("backlash"), e.at("interval"), 1e-6);
   }
-  const Json& verdict = told.at("verdict");
+  const Json& verdict = json.at("verdict");
   expect_numbers(table.back()[2], verdict.at("backlash"), verdict.at("interval"), 1e-6);
   const Json machine = table_with(page, {"value", "declared", "known within", "this record says"});
   ASSERT_GT(machine.size(), 20u);
@@ -127,7 +127,7 @@ TEST_F(Pages, ADiagnosisInABrowser) {
   const std::string text = page.at("text"), said = verdict.at("message");
   for (const std::string& part : std::vector<std::string>{
            said.substr(said.find(" by ") + 3), "2000 Hz", "The fitted machine over the record",
-           "# <script>alert(1)</script>", "SUNDIALS", told.at("version"), "run.csv", "matplotlib"})
+           "# <script>alert(1)</script>", "SUNDIALS", json.at("version"), "run.csv", "matplotlib"})
     expect_contains(text, part);
 }
 
@@ -218,15 +218,15 @@ TEST_F(Pages, ATraceInABrowser) {
   const Json seen = looked_at("out/report.html");
   if (seen.contains("skipped")) GTEST_SKIP() << seen["skipped"].get<std::string>();
   const Json& page = seen.at(0);
-  const Json told = Json::parse(read("out/report.json"));
+  const Json json = Json::parse(read("out/report.json"));
   expect_sound(page);
   expect_drawn(page, 5);  // residual over time, speed, position, order; what the effect adds
   const std::string text = page.at("text");
   for (const std::string& part :
-       std::vector<std::string>{told.at("message"), "asymmetric_viscous", "SUNDIALS", "matplotlib",
-                                told.at("version"), "schema_version: 1"})
+       std::vector<std::string>{json.at("message"), "asymmetric_viscous", "SUNDIALS", "matplotlib",
+                                json.at("version"), "schema_version: 1"})
     expect_contains(text, part);
-  const Json& torque = told.at("channels").at("torque");
+  const Json& torque = json.at("channels").at("torque");
   const Json& rows = page.at("tables")[0];
   for (const auto& [row, key] :
        std::vector<std::pair<int, std::string>>{{0, "before"}, {1, "after"}, {2, "floor"}})

@@ -37,7 +37,7 @@ class PlanMotion : public CommandTest {
   }
 };
 
-TEST_F(PlanMotion, AnArmThatFollowsItTellsWhatItsOwnMotionHides) {
+TEST_F(PlanMotion, AnArmThatFollowsItShowsWhatItsOwnMotionHides) {
   const std::string rig = "rig/two_link_arm_hidden.yaml";
   done("simulate " + rig + " --duration 30 --out ordinary.csv");
   EXPECT_EQ(run("diagnose_record ordinary.csv --rig " + rig + " --json ordinary.json").code, 3);
@@ -45,10 +45,10 @@ TEST_F(PlanMotion, AnArmThatFollowsItTellsWhatItsOwnMotionHides) {
       done("plan_motion " + rig + " --out motion.yaml --json plan.json --csv way.csv --rate 100");
   expect_contains(plan.out, "shoulder: ");
   expect_contains(plan.out, "gap shown: ");
-  const auto told = nlohmann::ordered_json::parse(read("plan.json"));
-  EXPECT_GT(told.at("information").at("gain"), 1);
-  EXPECT_LT(told.at("information").at("condition"), told.at("information").at("reference_condition"));
-  for (const auto& [name, joint] : told.at("joints").items()) {
+  const auto json = nlohmann::ordered_json::parse(read("plan.json"));
+  EXPECT_GT(json.at("information").at("gain"), 1);
+  EXPECT_LT(json.at("information").at("condition"), json.at("information").at("reference_condition"));
+  for (const auto& [name, joint] : json.at("joints").items()) {
     EXPECT_EQ(joint.at("gap").at("status"), "shown") << name;
     EXPECT_FALSE(joint.at("gap").at("hidden").empty()) << name;
   }
@@ -67,7 +67,7 @@ TEST_F(PlanMotion, AnArmThatFollowsItTellsWhatItsOwnMotionHides) {
   }
 }
 
-TEST_F(PlanMotion, AGapThatGravityHidesIsToldAndTheRestIsWritten) {
+TEST_F(PlanMotion, AGapThatGravityHidesIsReportedAndTheRestIsWritten) {
   hinge("held.yaml", "{lower: -0.5, upper: 0.5, acceleration: 2}");
   const Outcome outcome = run("plan_motion held.yaml --out motion.yaml");
   EXPECT_EQ(outcome.code, 3);

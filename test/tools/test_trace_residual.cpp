@@ -155,7 +155,7 @@ std::string at_one_speed(unsigned seed) {
 // At one speed the inertia has no part in the torque, and the two frictions are one number. By the noise that
 // is drawn some motion seems to stand out of it, and the torque is noise, or none does, and nothing is
 // fitted.
-TEST_F(TraceResidual, RecordsAtOneSpeedEndInAReportThatSaysWhyItCannotTell) {
+TEST_F(TraceResidual, RecordsAtOneSpeedEndInAReportThatSaysWhyThereIsNoAnswer) {
   write("ur10e_joint.yaml", content(package_file("config/ur10e_joint.yaml")));
   int not_fitted = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {

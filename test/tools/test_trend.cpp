@@ -123,7 +123,7 @@ TEST_F(TrendCommand, LimitsComeFromRigFileOrBaseline) {
   expect_contains(other["warnings"].dump(), "taken with another version of the rig file");
 }
 
-TEST_F(TrendCommand, DrawsWhatItTells) {
+TEST_F(TrendCommand, DrawsWhatItReports) {
   write_history(40, 0.5);
   run("backlash_trend elbow.csv --limit 150e-6 --json t.json --plot t.png");
   EXPECT_EQ(read("t.png").substr(1, 3), "PNG");
@@ -153,7 +153,7 @@ TEST_F(TrendCommand, RefusalsNameTheirReason) {
     EXPECT_EQ(outcome.code, code) << arguments << "\n" << outcome.err;
     expect_contains(outcome.err, "backlash_trend: ");
   }
-  // What damage left out is told, and does not stop the rest.
+  // What damage left out is reported, and does not stop the rest.
   write("elbow.csv", read("elbow.csv") + "1798761600,,estim");
   expect_contains(run("backlash_trend elbow.csv").err, "elbow.csv:5: has 3 of 13 cells; left out");
 }

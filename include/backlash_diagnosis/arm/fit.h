@@ -78,7 +78,7 @@ struct FittedMotion {
   bool marked() const { return state > 0; }
 };
 
-/// A base parameter: what of the standard ones the motions tell apart.
+/// A base parameter: a combination of the standard ones that the motions identify.
 struct BaseParameter {
   std::string name;  // of the standard parameter that leads it
   signal::Measured measured;
@@ -141,7 +141,7 @@ std::vector<double> relative_errors(const ArmFit& fit, const FitFreedom& freedom
 
 /// What relative_errors() should be by the fit's own account: its residuals where it was fitted, and how well
 /// it knows what each sample depends on. Needs `covariance`.
-std::vector<double> foretold_errors(const ArmFit& fit, const FitFreedom& freedom,
+std::vector<double> expected_errors(const ArmFit& fit, const FitFreedom& freedom,
                                     const std::vector<FittedMotion>& motions, double least_seconds);
 
 }  // namespace backlash::arm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Within which speed dry friction of a drive turns its sign: v_0 of arm_rig.h, told from records.
+// Within which speed dry friction of a drive turns its sign: v_0 of arm_rig.h, estimated from records.
 //
 // Of a v_0 that is not the machine's, c (S' - S) is left about each reversal, c being Coulomb friction. Other
 // effects of low speed have nearly that shape: exp(-(v / w_s)^2) S with w_s near v_0 passes for it, so that

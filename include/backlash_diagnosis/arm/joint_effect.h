@@ -7,20 +7,17 @@
 //   cogging                       A sin(n q + p)             n periods per turn of the joint
 //   position_dependent_friction   S A sin(n q + p)
 //   stribeck                      T S exp(-(v / w_s)^2)      dry friction that is more at low speed
-//   presliding                    -2 T S exp(-x / d)         x: way since the last reversal (Dahl 1968):
-//   friction T
-//                                                            builds up over the distance d
+//   presliding                    -2 T S exp(-x / d)         x: way since the last reversal (Dahl 1968);
+//                                                            friction T builds up over the distance d
 //   asymmetric_viscous            a |v|                      a: half the difference of the directions
 //   quadratic_drag                A v |v|
 //   load_dependent_friction       mu S |tau|                 tau: the chain's own torque
-//   motor_torque_gain             g u_j                      u_j: what the model has this drive supply: what
-//   is
-//                                                            recorded is more by the share g, and the motor's
-//                                                            torque 1 / (1 + g) of it
-//   transmission_coupling         c u_i                      u_i: what the model has the drive of joint i
-//   supply; as
-//                                                            where the motor of a wrist sits on a shaft that
-//                                                            also turns this joint
+//   motor_torque_gain             g u_j                      u_j: torque of this drive in the model; the
+//                                                            recorded torque is larger by the share g, the
+//                                                            motor's torque 1 / (1 + g) of it
+//   transmission_coupling         c u_i                      u_i: torque of the drive of joint i in the
+//                                                            model, as where the motor of a wrist sits on a
+//                                                            shaft that also turns this joint
 // S = tanh(v / v_0) as there.
 #pragma once
 

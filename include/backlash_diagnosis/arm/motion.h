@@ -45,7 +45,7 @@ struct ArmMotion {
   std::size_t seconds() const { return std::size_t(double(time.size()) * interval); }
 };
 
-/// The stretches between gaps; those below `kShortestStretch` are left out, which `warnings` tells. Throws
+/// The stretches between gaps; those below `kShortestStretch` are left out, which `warnings` names. Throws
 /// BadData where none is left.
 std::vector<ArmMotion> motions_of(const ArmRecord& record, const ArmRig& rig,
                                   std::vector<std::string>& warnings);

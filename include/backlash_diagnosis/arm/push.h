@@ -16,7 +16,7 @@
 namespace backlash::arm {
 
 struct PushSettings {
-  double quiet = 1;    // s, at the start, that tells the noise; choice
+  double quiet = 1;    // s, at the start, from which the noise is estimated; choice
   double onset = 8;    // deviations of noise from the quiet level; theory: by chance once in 10^15 samples
   double samples = 5;  // whose mean is looked at; choice
   double active =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What diagnose_record tells of an arm: for each joint what it tells of one, with load, pose and motion.
+// What diagnose_record reports of an arm: for each joint what it reports of one, with load, pose and motion.
 #pragma once
 
 #include <iosfwd>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What plan_motion tells of a planned motion.
+// What plan_motion reports of a planned motion.
 #pragma once
 
 #include <iosfwd>

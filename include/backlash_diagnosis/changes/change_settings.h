@@ -87,8 +87,9 @@ struct ChangeSettings {
   double onset_drop = 8;      // of twice the log likelihood, as wide as the onset is uncertain. Simulation
   double onset_least = 0.1;   // s, half of the narrowest interval. Choice
   double unknown_left = 0.4;  // - of the squares after the onset that may be left. Choice
-  // Squares of the residual over those of healthy motion as rough, of what no effect explains: it cannot be
-  // told, or is a change. Choices. Simulation of healthy machines in other tasks: one inertia 2, two 5.
+  // Squares of the residual over those of healthy motion as rough, of what no effect explains: beyond it the
+  // answer is "cannot tell", or a change. Choices. Simulation of healthy machines in other tasks: one inertia
+  // 2, two 5.
   double unknown_louder = 4, unknown_of_two = 16;
   // The same of a long stretch over the rest of the record, in motion alike: too little to be a change, too
   // much to be healthy. Choices.
@@ -98,8 +99,8 @@ struct ChangeSettings {
   std::size_t louder_windows = 16;  // of the stretch, and of the rest
   std::size_t least_windows = 4;    // that it lasts. Choice: a push is no change of the machine
   double same_link = 0.3;  // - of the squares left by which a payload at another link does better. Choice
-  double told_apart =
-      8;  // of twice the log likelihood, by which effects are told apart. Theory: 2.8 deviations
+  double distinguished =
+      8;  // of twice the log likelihood, by which effects are distinguished. Theory: 2.8 deviations
   double alike = 0.97;        // - of the best gain: effects that fit alike. Choice
   double model_error = 0.03;  // - of a size, as the shape of an effect is an idealisation. Choice
 };

@@ -37,7 +37,7 @@ struct Change {
          error_after = 0;  // N m, rms of the residual after the onset; of the chain: all joints
 };
 
-/// A joint of an arm of which this record tells nothing.
+/// A joint of an arm that this record does not judge.
 struct Unjudged {
   std::string joint, why;
 };

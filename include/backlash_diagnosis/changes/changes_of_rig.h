@@ -5,8 +5,8 @@
 // ratio over value, onset and shape (a step, or growth to the end) of the scores of all stretches; then more
 // stretches about the onset, by halves.
 //
-// Values of the healthy machine are nuisances with a spread from record to record. A change is told by the
-// name of a value where that value alone explains what all values together would; else it is unknown.
+// Values of the healthy machine are nuisances with a spread from record to record. A change is reported by
+// the name of a value where that value alone explains what all values together would; else it is unknown.
 #pragma once
 
 #include <vector>
@@ -17,13 +17,13 @@
 
 namespace backlash::changes {
 
-/// Throws CannotIdentify where the healthy records do not fit the machine or the record tells too little,
+/// Throws CannotIdentify where the healthy records do not fit the machine or the record shows too little,
 /// InvalidParameter for settings out of range, Cancelled.
 Changes changes_of_rig(const diagnosis::WaveformSettings& machine, const std::vector<record::Record>& healthy,
                        const record::Record& record, const ChangeSettings& settings = {},
                        const Progress& progress = {});
 
-/// Of any machine whose changes can be told. Throws as changes_of_rig and the other detect_changes.
+/// Of any machine whose changes can be found. Throws as changes_of_rig and the other detect_changes.
 Changes detect_changes(const rig_file::RigFile& file, const std::vector<record::Record>& healthy,
                        const record::Record& record, const ChangeSettings& settings = {},
                        const Progress& progress = {});

@@ -65,7 +65,7 @@ struct Mismatch {
 /// Why a record was not taken under the conditions of a curve; nothing where it was. Compares sampling rate
 /// (2 %), excitation amplitude and shape (5 %, from motor_torque where recorded), the signal's own level
 /// (12 % beyond those on the curve), frequency (2 %, with two periods or more), noise, saturation, and
-/// whether the output moves although it should be locked. What cannot be told: without motor_torque, other
+/// whether the output moves although it should be locked. What cannot be checked: without motor_torque, other
 /// amplitudes within about 12 % and another shape with the same median magnitude; without motor_position,
 /// backlash beyond the end of the curve; without it and load_position, an output that moves but leaves the
 /// signal's level alone.

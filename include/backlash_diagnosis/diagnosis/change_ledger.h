@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What has changed of a joint, told once: looks at overlapping stretches of its record find the same change
-// again and again, sharper or less sharp, and no look sees one that began before its stretch. Knows stretches
-// and what was found in them, not how.
+// What has changed of a joint, reported once: looks at overlapping stretches of its record find the same
+// change again and again, sharper or less sharp, and no look sees one that began before its stretch. Knows
+// stretches and what was found in them, not how.
 //
 // How often a healthy joint is called changed. A look at `length` seconds may find something by chance with
 // rate * length; looks each `interval` seconds therefore get the rate that rate_of_look() says, and the sum
@@ -40,7 +40,7 @@ struct ChangeLook {
   double from = 0, to = 0;             // s, the stretch
   std::vector<FoundChange> changes;    // by onset
   std::vector<std::string> different;  // effects that are there from the beginning of the stretch
-  std::vector<std::string> unjudged;   // joints of an arm of which it tells nothing, and why
+  std::vector<std::string> unjudged;   // joints of an arm that it does not judge, and why
   long windows = 0;                    // of motion that could be judged
   std::vector<std::string> warnings;
 };
@@ -58,31 +58,31 @@ const char* to_string(ChangeState state);
 std::optional<ChangeState> change_state_from(const std::string& name);
 
 struct KnownChange {
-  long id = 0;  // counted from 1 in the order in which they are told; 0: not told
+  long id = 0;  // counted from 1 in the order in which they are reported; 0: not reported
   ChangeState state = ChangeState::suspected;
   FoundChange found;      // the sharpest so far
   double seen = 0;        // s, end of the last stretch in which it was found
   int missed = 0;         // looks in a row that should have found it
   long key = 0;           // of the ledger
-  long ends = 0;          // the change that this one undoes, by id; 0: none. Not told by itself
+  long ends = 0;          // the change that this one undoes, by id; 0: none. Not reported by itself
   bool differed = false;  // a look at the time after its onset saw the machine differ from its beginning
   int alike = 0;          // looks in a row, since then, that saw no difference
-  bool told() const { return id > 0; }
+  bool reported() const { return id > 0; }
 };
 
 class ChangeLedger {
  public:
-  /// Takes a look; ids of changes that are to be told, as they are new or known better.
+  /// Takes a look; ids of changes that are to be reported, as they are new or known better.
   std::vector<long> take(const ChangeLook& look);
 
   /// The clock was set: what only one look has found is forgotten.
   void restart();
 
-  /// Continues from what was told before a restart of the program.
-  void restore(const std::vector<KnownChange>& told);
+  /// Continues from what was reported before a restart of the program.
+  void restore(const std::vector<KnownChange>& reported);
 
-  /// All that were told, the oldest first; at most kMostKnown.
-  std::vector<KnownChange> told() const;
+  /// All that were reported, the oldest first; at most kMostKnown.
+  std::vector<KnownChange> reported() const;
   const KnownChange& change(long id) const;
 
   /// Effects that the last looks had from the beginning of their stretch, while no standing change explains

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What was told of the changes of a joint, as CSV: a line for each message, the last line of an id counts.
+// What was reported of the changes of a joint, as CSV: a line for each message, the last line of an id
+// counts.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Coherence between torque and acceleration under random torque, as a detector of play (idea: Dagalakis and
-// Myers, cited by Sarkar, Ellis and Moore 1997, Section 2). It tells whether the machine answers linearly,
+// Myers, cited by Sarkar, Ellis and Moore 1997, Section 2). It shows whether the machine answers linearly,
 // not how much play there is; friction, a contact that opens and any other nonlinearity lower it as play
 // does, noise too.
 //

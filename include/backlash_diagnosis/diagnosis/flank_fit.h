@@ -8,40 +8,16 @@
 // common: offset and scale of the encoders, eccentricity, transmission error, and torques that depend on
 // position (gravity, cogging) over the stiffness. b is the free play.
 //
-// All of it is averaged over short windows with triangular weights, for which acceleration is exactly a
-// second difference of positions: nothing is differentiated by sample.
+// All of it is averaged over short windows, see flank_windows.h.
 #pragma once
 
 #include <cstddef>
 #include <functional>
 #include <vector>
 
+#include "backlash_diagnosis/diagnosis/flank_windows.h"
+
 namespace backlash::diagnosis {
-
-/// Samples at equal distances `interval` [s], all columns of the same length, finite. `unbroken[i]` is false
-/// where samples i - 1 and i are not neighbours in time.
-struct TwoEncoders {
-  double interval = 0;
-  std::vector<double> torque, motor, load;  // N m, rad, rad
-  std::vector<char> unbroken;
-};
-
-/// Averages over 2 * half - 1 samples, one window every `half` samples.
-struct FlankWindows {
-  std::vector<std::size_t> centre;                                          // sample
-  std::vector<double> torque, deflection, load, speed, slip, acceleration;  // slip: motor minus load speed
-  std::vector<double> load_acceleration;
-  std::vector<double> least, largest;  // rad, deflection of its samples
-  std::vector<double> rough;           // rad, amplitude by which it alternates from sample to sample, mean
-  std::size_t size() const { return centre.size(); }
-};
-FlankWindows average_windows(const TwoEncoders& motion, std::size_t half);
-
-/// The torque that the motion of the whole machine takes, in the gap as on the flanks,
-///   tau = J_M a_M + J_L a_L + d w_M + C sign(w_M) + h(q_L),
-/// fitted to the recorded one, instead of it: free of its noise, and wrong where the machine has more.
-/// Two-stage least squares, the load's motion as instrument (Theil 1953).
-FlankWindows with_balanced_torque(FlankWindows windows);
 
 struct FlankModel {
   std::function<double(double)> elastic;
@@ -51,17 +27,16 @@ struct FlankModel {
 };
 
 /// What keeps a record from showing two flanks; the later, the closer it comes.
-enum class FlanksLack {
-  pressed,          ///< a flank is pressed in less than 10 % of the windows
-  both_directions,  ///< each is pressed in one direction of motion only: dry friction of the motor looks
-                    ///< alike
-  whole_windows,    ///< flanks change within the windows
-  own_part,         ///< position, speed, acceleration and torque tell which is pressed
-  nothing
+enum class FlankObstacle {
+  not_pressed,    ///< a flank is pressed in less than 10 % of the windows
+  one_direction,  ///< each is pressed in one direction of motion only: dry friction of the motor looks alike
+  chatter,        ///< flanks change within the windows
+  own_part,       ///< position, speed, acceleration and torque determine which is pressed
+  none
 };
 
 struct FlankFit {
-  FlanksLack lack = FlanksLack::pressed;  ///< `nothing` where `found`
+  FlankObstacle obstacle = FlankObstacle::not_pressed;  ///< `none` where `found`
   /// Both flanks are pressed (10 % of the windows on each), in either direction of motion, and which is no
   /// function of position, speed, acceleration and torque (of the squares of `side` these leave 0.3 % and
   /// more).
@@ -73,7 +48,7 @@ struct FlankFit {
   double compliance_factor = 1;           // g
   double scale_error = 0;                 // slope of f over q_L
   /// rad, what the gap gains if all of the residual is noise of the torque, which draws the compliance
-  /// towards 0 (Fuller 1987, Section 1.1); infinite where then no compliance is told.
+  /// towards 0 (Fuller 1987, Section 1.1); infinite where then no compliance is left.
   double attenuation = 0;
   double residual = 0;           // rad, rms
   std::size_t used[2] = {0, 0};  // windows on the negative and the positive flank

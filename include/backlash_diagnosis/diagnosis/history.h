@@ -34,7 +34,7 @@ HistoryEntry history_entry(double time, const Diagnosis& diagnosis, const std::s
 
 /// Writes a history. The first line names the columns; a line per entry, numbers in full precision, an empty
 /// cell where not known; `date` is for people and not read back. The last cell is in quotes, so that a line
-/// that was cut off can be told from a whole one. At `rotate_at` bytes the file becomes PATH.1, the next
+/// that was cut off is distinguished from a whole one. At `rotate_at` bytes the file becomes PATH.1, the next
 /// PATH.2 and so on; nothing is ever deleted or overwritten.
 class History {
  public:

@@ -20,18 +20,18 @@
 //
 // which holds for any torque and initial speed. Release: |F| falls below half of its median. Impact: F passes
 // half of its first peak, corrected for the averaging; how much depends on the duration of the contact, which
-// the elastic deflection of the flank tells (short contacts: closed form; long ones: from simulated
+// the elastic deflection of the flank determines (short contacts: closed form; long ones: from simulated
 // Hunt-Crossley impacts).
 //
 // From a tachometer alone, as Stein and Wang have it (Sarkar, Ellis and Moore 1997, Section 8), or an encoder
-// of the motor alone: without motor_torque a square wave without offset is told from the motion. Its period
-// is that of the motion; it switches where, before most crossings of the middle, the acceleration jumps; its
-// level is the one that leaves least torque on the flank in flight and least beside it at rest. What it gives
-// must not contradict the places where the motor rests. Any other torque is refused, mostly as no phase of
-// the period begins the crossings.
-// The level that is told takes up what is wrong with the declared inertia, and a constant friction: free
-// flight then says less of the machine than with a recorded torque. Of 400 simulated rigs of Sarkar's with
-// half gaps up to 100 um, 358 answers, 98 % of the intervals right, none off by half of its width.
+// of the motor alone: without motor_torque a square wave without offset is estimated from the motion. Its
+// period is that of the motion; it switches where, before most crossings of the middle, the acceleration
+// jumps; its level is the one that leaves least torque on the flank in flight and least beside it at rest.
+// What it gives must not contradict the places where the motor rests. Any other torque is refused, mostly as
+// no phase of the period begins the crossings. The level that is estimated takes up what is wrong with the
+// declared inertia, and a constant friction: free flight then says less of the machine than with a recorded
+// torque. Of 400 simulated rigs of Sarkar's with half gaps up to 100 um, 358 answers, 98 % of the intervals
+// right, none off by half of its width.
 //
 // Needs motor_velocity (or motor_position, differentiated), and motor_torque but for a square wave; the motor
 // side must change flanks (square-wave or alternating torque), and the load must be locked, or load_position
@@ -87,7 +87,8 @@ struct MomentumTransferSettings {
 ///   insufficient_data  a channel is missing, fewer than four crossings of the gap, or no motor_torque and a
 ///                      motion that is not that under a square wave; the load is free and the interval holds
 ///                      0
-///   out_of_domain      sampling too slow for the coupling; impacts cannot be told from noise; flanks never
+///   out_of_domain      sampling too slow for the coupling; impacts cannot be distinguished from noise;
+///   flanks never
 ///                      change; no free flight between them: torque is left that inertia and damping do not
 ///                      explain (friction, another machine); a motor whose momentum at the impacts is less
 ///                      than a tenth of what friction took on the way; less travel than elastic deflection;

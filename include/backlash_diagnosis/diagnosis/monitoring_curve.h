@@ -30,7 +30,7 @@ struct CurveConditions {
   std::string signal;           // channel name
   std::string excitation;       // type
   double amplitude = 0;         // N m, largest motor torque
-  double excitation_level = 0;  // N m, median of |motor torque|: tells a square wave from a sine
+  double excitation_level = 0;  // N m, median of |motor torque|: distinguishes a square wave from a sine
   double frequency = 0;         // Hz
   double sampling_rate = 0;     // Hz
   ApdLayout apd;

@@ -6,33 +6,33 @@
 // to 1 %, eccentricity, transmission error, gravity, cogging; where the load moves each may follow its
 // position.
 //
-// Skew: a load encoder that is d [s] late adds d w_L to the difference. Where the load moves, the record
-// tells d (record/encoder_skew.h); where it is four standard errors away from the declared one and the flanks
-// are told more surely without it, it is taken out. A smaller one acts like a friction of the motor, which
-// the fit holds.
+// Skew: a load encoder that is d [s] late adds d w_L to the difference. Where the load moves, d is estimated
+// from the record (record/encoder_skew.h); where it is four standard errors away from the declared one and
+// the flanks are known more surely without it, it is taken out. A smaller one acts like a friction of the
+// motor, which the fit holds.
 //
-// Elastic deflection: where the load moves, the record itself tells how deflection follows torque; where it
+// Elastic deflection: where the load moves, the record itself shows how deflection follows torque; where it
 // is locked, or the record does not hold it to 10 %, the declared function counts.
 //
 // Where each flank is pressed in one direction of motion only, as those of a light load that is dragged, a
 // play looks as more dry friction of the motor does: windows in which the motor moves away from the pressed
-// flank tell them apart, and a reading with fewer than three stays of such, or 4 % of its windows, is none.
+// flank distinguish them, and a reading with fewer than three stays of such, or 4 % of its windows, is none.
 // Nor is one with less than a tenth of its windows on one of the flanks, nor one in which position, speed,
-// acceleration and torque tell which flank is pressed (moves to and fro over the same path): there play is
-// what the encoders may be off by. Nor one whose flanks change within its windows, as under a drive that
+// acceleration and torque determine which flank is pressed (moves to and fro over the same path): there play
+// is what the encoders may be off by. Nor one whose flanks change within its windows, as under a drive that
 // chatters: such averages show no play (describing function of a dead zone under dither).
 //
-// A load that moves tells the torque on the flanks as well: what the motion of both takes, fitted to the
+// A load that moves shows the torque on the flanks as well: what the motion of both takes, fitted to the
 // recorded torque (with_balanced_torque), is free of its noise, which as a regressor would draw compliance
 // and play towards others (Fuller 1987). The record is read by either torque and over windows of 7 to 63
 // samples; that reading counts which is surest. Read also with a deflection that follows the torque by other
 // laws (powers from 0.55 to a spring's 1, Hertz's 2/3 among them, springs that harden). Laws are compared by
 // what they leave of all windows, those in flight too, where no torque may be left: mean squares over those
-// of the best law, geometric mean over the cuts that tell laws apart. Where the declared one is clearly worse
-// than another, the better counts, and the interval holds the play by all that leave up to 1.5 times what the
-// best does (2.5 where that tells the play to a tenth only, be it the declared one; 3 where the recorded
-// torque is too noisy). Where the declared one counts it holds those that stays on the flanks do not tell
-// from it.
+// of the best law, geometric mean over the cuts that distinguish laws. Where the declared one is clearly
+// worse than another, the better counts, and the interval holds the play by all that leave up to 1.5 times
+// what the best does (2.5 where that gives the play to a tenth only, be it the declared one; 3 where the
+// recorded torque is too noisy). Where the declared one counts it holds those that stays on the flanks do not
+// distinguish from it.
 //
 // Interval, 95 %, root of the sum of squares of
 // - scatter: Student t times the standard error, stays on a flank counted as independent,
@@ -75,7 +75,8 @@ struct PositionDifferenceSettings {
 
   /// Relative 95 % uncertainty of elastic_deflection, >= 0, by which the whole machine may differ from the
   /// declared one. Where the load is locked the interval is wider by twice this share of the deflection under
-  /// the median torque; the fit does not use it, as a record of nearly one torque cannot tell it from play.
+  /// the median torque; the fit does not use it, as a record of nearly one torque cannot distinguish it from
+  /// play.
   double declared_uncertainty = 0;
 
   /// kg m^2, >= 0: what motor_torque accelerates before it reaches the flank, at the motor_position axis. A

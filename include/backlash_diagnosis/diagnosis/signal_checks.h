@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a signal itself tells about the conditions it was taken under: period, amplitude, saturation.
+// What a signal itself shows of the conditions it was taken under: period, amplitude, saturation.
 #pragma once
 
 #include <optional>

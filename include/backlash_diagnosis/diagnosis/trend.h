@@ -17,7 +17,7 @@ struct TrendPoint {
 
 /// NaN where not known; intervals hold with 95 %.
 struct Trend {
-  bool known = false;                                        // a rate with an interval can be told
+  bool known = false;                                        // a rate with an interval can be estimated
   bool grows = false;                                        // the interval of the rate is above 0
   bool exceeded = false;                                     // the level is at or above the limit
   double rate = kNaN, rate_lower = kNaN, rate_upper = kNaN;  // unit per s

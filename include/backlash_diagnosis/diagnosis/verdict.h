@@ -46,8 +46,8 @@ struct Verdict {
 /// Where one of the members has fitted the machine's values to the record (Estimate::fits_machine), the
 /// verdict is its answer alone: the others agree, but rest on values that may be wrong.
 ///
-/// Where one tells the play from wall to wall under torque (Estimate::deflection) that is the quantity
-/// of the verdict, and free play that fits into it is told as a part of it.
+/// Where one gives the play from wall to wall under torque (Estimate::deflection) that is the quantity
+/// of the verdict, and free play that fits into it is reported as a part of it.
 ///
 /// Contradiction: never settled by the number of methods, as those that share signal, curve or declared
 /// values err together. Estimates of one Estimate::witness that contradict each other are left out where
@@ -57,7 +57,7 @@ struct Verdict {
 ///
 /// Grade: by the limits, of the combined value or with a baseline of its growth since then. `good` only where
 /// the whole interval is below `watch`; a value below it with an interval that is not is `watch`. The message
-/// tells the other grades that the interval reaches into. Without limits a value is `ungraded`. Lower bounds
+/// names the other grades that the interval reaches into. Without limits a value is `ungraded`. Lower bounds
 /// alone are graded by the highest of them, or cannot_tell below `watch` and without limits. The interval of
 /// the growth adds the uncertainties of now and then as independent ones: different records; what they share
 /// cancels. A baseline without interval is taken as exact.

@@ -26,7 +26,7 @@ struct TorqueExcursion {
 /// back by then.
 std::vector<TorqueExcursion> find_excursions(const std::vector<double>& torque, double level);
 
-/// What one excursion tells about its wall. Positions in rad, not multiplied by side.
+/// What one excursion shows of its wall. Positions in rad, not multiplied by side.
 struct WallReading {
   int side = 1;
   double time = 0;           ///< s, middle of the window

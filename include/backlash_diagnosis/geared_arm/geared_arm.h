@@ -3,8 +3,8 @@
 // `simulation`.
 //
 // Motor j, on its own side of the gap, and link side j, all seen from the joint's side of the reduction:
-//   J_j a_M = tau_j - friction_j(v_M) - T_j,   T_j = s F(|phi| - b_j / 2, s phi'),  phi = q_M - q_j,  s =
-//   sign(phi) M(q) a + c(q, v) + g(q) = T - friction of the links
+//   J_j a_M = tau_j - friction_j(v_M) - T_j,   T_j = s F(|phi| - b_j / 2, s phi'),
+//   M(q) a + c(q, v) + g(q) = T - friction of the links,   phi = q_M - q_j,  s = sign(phi)
 // F: a contact law over angles; b_j: the whole play. friction_j as arm/arm_rig.h and arm/joint_effect.h have
 // it, the chain's own torque being T_j; without a distance over which it builds up. A joint without `gear`
 // has its motor on the link, and no friction that follows the load. A joint that is `held` stays where it is.

@@ -5,7 +5,7 @@
 // Every joint follows a Fourier series (simulation/fourier_motion.h) that begins and ends each period at
 // rest. A gap is visible where the load on the mesh, T of geared_arm/play.h, stays on either flank often and
 // long enough for the diagnosis to be certain, by its own rule. Among such motions the search takes the one
-// that tells most of the base parameters: the largest log det of Y^T Y, Y: the columns of the regressor of
+// that determines best the base parameters: the largest log det of Y^T Y, Y: the columns of the regressor of
 // links and drives that do not depend on others and those of the delays of the torques, each row over the
 // noise of its joint's torque (D-optimal; Swevers et al. 1997, IEEE T-RA 13:730). Random motions first, then
 // small changes of the best ones that are kept where they are better.
@@ -34,7 +34,7 @@ struct PlanSettings {
   PlaySettings play;
 };
 
-/// How much a motion tells of the base parameters.
+/// How well a motion determines the base parameters.
 struct MotionInformation {
   double condition = 0;   // of Y, its columns scaled to length 1
   double log_volume = 0;  // log det(Y^T Y) / 2: less by that of another motion, over the number of base
@@ -52,7 +52,7 @@ enum class GapView {
   shown,        // stays enough on both flanks
   unconfirmed,  // the same, but the file says nothing of the drive's own torque, which may hide the load
   not_found,    // none of the motions that were tried has
-  impossible    // no pose and motion within the limits that was looked at gives a load that tells
+  impossible    // no pose and motion within the limits that was looked at gives a load that is large enough
 };
 
 /// As files and reports have it.

@@ -8,7 +8,7 @@
 // and stays so. f: offset of the encoders, s: their scale, d: their skew in time; errors up to three times
 // per turn where the record shows them. Under small loads, where the side is not certain, e(T) is a law's: of
 // a spring, of teeth that yield as a power of the load (Hertz 2/3), of springs that harden. All that the
-// record does not rule out are in the interval. The motor's torque only tells whether the declared chain is
+// record does not rule out are in the interval. The motor's torque only shows whether the declared chain is
 // the one that moved: beyond any friction of the motor it must agree with T.
 //
 // Interval, 95 %, root of the sum of squares of
@@ -18,7 +18,7 @@
 //   file says less, 1 % of the largest load,
 // - 2 % of the play, as position_difference where the deflection bends otherwise than any of them.
 // Half of it beyond 15 % of the play: "cannot tell closer than". Teeth give way to the load: an encoder that
-// does not follow its motor, or from flank to flank the other way, tells nothing.
+// does not follow its motor, or from flank to flank moves the other way, is no evidence.
 #pragma once
 
 #include <optional>
@@ -44,7 +44,7 @@ struct PlaySettings {
   std::size_t least_stays = 3;  // on each flank, for a standard error that means something; choice
   double disagreement = 0.1;    // beyond it the chain is not the one that moved; choice, see doc/arm.md
   double bend = 0.02;           // of the play, see above
-  double vague = 0.15;  // half width of the interval, of the play, beyond which nothing is told; choice
+  double vague = 0.15;  // half width of the interval, of the play, beyond which no play is reported; choice
   double worst_residual = 0.2;  // of the play: beyond it the teeth do not rest on their flanks; choice
 };
 
@@ -56,7 +56,7 @@ struct JointPlay {
   double fastest = 0;                             // rad/s
   double disagreement = 0;        // of the motor's torque and the chain's, relative, rms, friction aside
   std::size_t stays[2] = {0, 0};  // on the negative and the positive flank
-  std::string one_flank;          // why the load tells nothing, for people; empty: it presses both flanks
+  std::string one_flank;          // why the load shows no play, for people; empty: it presses both flanks
   std::optional<double> pose;  // rad, of this joint, the others as they were on average: where gravity would
                                // turn the load that never turned
 };

@@ -13,27 +13,27 @@
 // q_M: of the record. Links, drives and friction are those of the rig file after a fit to the whole record
 // (arm/fit.h), so that friction and payload may be wrong in the file. Free within what is known: b, k, c, p,
 // the rotor's share of what the motor moves, friction behind the gap, the time at which a torque was
-// recorded; and of each turn alone beta, a torque [N m] on each link that nothing tells, how the link swings
+// recorded; and of each turn alone beta, an unknown torque [N m] on each link, how the link swings
 // on its teeth as the turn begins, and how much wider the gap seems there (10 % of it and 3 % of the
-// deflection of the teeth): what these equations do not hold makes each turn say another gap, and the one
-// with the hardest touch would tell it alone otherwise. All joints and all turns are fitted together: what
-// the play of one joint throws on the teeth of another is in M.
+// deflection of the teeth): these equations are not exact, so that each turn says another gap, and without
+// this freedom the turn with the hardest touch alone would decide. All joints and all turns are fitted
+// together: what the play of one joint throws on the teeth of another is in M.
 //
 // The residual [N m], averaged over some samples, is weighted by its covariance: noise of the torque and of
-// the position, a slow torque that nothing tells (as large as the fit to the whole record leaves), and
+// the position, an unknown slow torque (as large as the fit to the whole record leaves), and
 // friction about a standstill. Where more is left the noise of that turn counts as that large. The rotor's
 // inertia multiplies noise of the position, for which the cost is corrected: else a lighter rotor would seem
 // better.
 //
 // A joint whose link is too light for the sampling interval (fewer than eight samples in a cycle of its
-// teeth) is not told; it is fitted as all others for what it throws on their teeth, and below four samples
+// teeth) gets no answer; it is fitted as all others for what it throws on their teeth, and below four samples
 // turns with its motor.
 //
 // Interval, 95 %: Student's t with the larger of two standard errors (turns as clusters; the fit's own), and
 // `model` of the play and `law` of the deflection of the teeth for teeth that yield by no power: a soft start
 // of the teeth and a small play move the motor alike. Of a joint without a play that is larger than its
 // interval: at most the gap with which the record, all else fitted again, is explained worse by `rival`.
-// Nothing is told of a joint while another one of those fitted with it is not explained.
+// No joint gets an answer while another one of those fitted with it is not explained.
 #pragma once
 
 #include <string>
@@ -48,7 +48,7 @@ namespace backlash::geared_arm {
 struct TraverseSettings {
   double least_load = 0.1;    // of the largest |T|, beyond friction: below it the flank is not certain; as
                               // geared_arm/play.h
-  double model = 0.05;        // of the play; choice, see the study in doc/arm.md
+  double model = 0.05;        // of the play; choice, see the study in doc/evidence/arm.md
   double law = 0.13;          // of the deflection under the usual load; choice: teeth by no power
   double disagreement = 0.1;  // of the torque of the joint (rms) that the fitted chain may leave; choice
   double friction = 2;   // Coulomb's of the motor, that the load must reach on both flanks: what a bristle
@@ -60,8 +60,8 @@ struct TraverseSettings {
   double flattest = 0.82, steepest = 1.58;  // powers at the ends of what the fit looks at; choice: such
                                             // teeth, a soft start for instance, yield by no power
   double rival = 9;                         // theory: three standard errors
-  double vague = 0.2;  // half width of the interval, of the play, beyond which nothing is told; choice
-  std::size_t least_turns = 4;  // that tell the play; choice, for a standard error that means something
+  double vague = 0.2;  // half width of the interval, of the play, beyond which no play is reported; choice
+  std::size_t least_turns = 4;  // that determine the play; choice, for a standard error that means something
 };
 
 /// A turn of the load in which the teeth crossed the gap.
@@ -77,7 +77,7 @@ struct JointTraverse {
   diagnosis::Estimate estimate;     // gap_traverse
   bool turns = false;               // the load is certain on either flank somewhere
   double misfit = 0;                // noises that are left in seven of ten turns at most
-  std::vector<Crossing> crossings;  // where the play is told
+  std::vector<Crossing> crossings;  // where the play is reported
 };
 
 /// One per joint of the rig. `warnings` as arm::motions_of(). Throws BadData as that.

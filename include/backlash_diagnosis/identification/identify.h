@@ -80,7 +80,7 @@ struct Identification {
 
   std::optional<SeveralMachines> several;  // where the records contradict each other; errors hold them all
   /// Why the machine is none of the rig file's kind: it explains less than half of what a channel does. The
-  /// errors of the values that this channel tells are infinite then.
+  /// errors of the values that this channel determines are infinite then.
   std::optional<std::string> unexplained;
   std::optional<SpeedCalibration> speed_calibration;
   std::optional<PositionCalibration> position_calibration;
@@ -102,8 +102,8 @@ struct Identification {
 Identification commission(const rig_file::RigFile& file, const std::vector<record::Record>& records);
 
 /// For a rig with two inertias or one (mesh: rigid). Starts from what the rig declares. Throws CannotIdentify
-/// where no procedure can use any record, with all reasons; BadData; Cancelled. `drive` tells the gap map
-/// which orders its parts have.
+/// where no procedure can use any record, with all reasons; BadData; Cancelled. `drive` gives the gap map
+/// the orders of its parts.
 Identification identify(const model::Rig& declared, const std::vector<record::Record>& records,
                         const Progress& progress = nullptr,
                         const std::optional<rig_file::Drive>& drive = std::nullopt);

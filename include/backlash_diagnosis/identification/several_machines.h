@@ -36,7 +36,7 @@ struct SeveralSettings {
 /// Whether so much may be left of a record alone, where all together leave `together` times the noise.
 bool is_met(double left, double together, const SeveralSettings& settings = {});
 
-/// Nothing where a record is not met by itself, or no value that all of them tell clearly differs.
+/// Nothing where a record is not met by itself, or no value that all of them determine clearly differs.
 std::optional<SeveralMachines> several_machines(std::vector<RecordAlone> records, double together,
                                                 const SeveralSettings& settings = {});
 

@@ -151,7 +151,7 @@ struct TermShape {
   bool later = false;
 };
 
-/// 1/rad: orders that differ by less are hard to tell apart over the travel; infinite where nothing moves.
+/// 1/rad: orders that differ by less are hard to distinguish over the travel; infinite where nothing moves.
 double order_resolution(const MotionRange&);
 
 /// How the search for what a model lacks tries a term: for each combination of its choices and shapes, with a
@@ -162,7 +162,7 @@ struct TermSearch {
   double (*typical)(const MotionRange&) = nullptr;  // a strength that would show clearly, > 0
   std::vector<TermShape> shapes;
   bool pairs = false;               // also two of it with different values of its one shape
-  bool needs_turning_link = false;  // tells nothing of a locked link
+  bool needs_turning_link = false;  // has no effect on a locked link
 };
 
 /// One kind of look-up table that is learned from records: what its values are added to, and over what.

@@ -29,7 +29,7 @@
 //   torque on the gear    r side F
 //   torque on the pinion  -r (side F - sum (F_i de_i/ds - dw_i/ds E(d_i)))     E [J]: elastic energy of f
 //
-// which StiffnessVariation leaves out. Left out here: contact off the line of action (the `transition` of the
+// which StiffnessVariation leaves out. Not included: contact off the line of action (the `transition` of the
 // stiffness stands for it), friction between the teeth, bending of the gears' bodies.
 #pragma once
 

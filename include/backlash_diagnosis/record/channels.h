@@ -10,9 +10,9 @@
 //     time:           {column: "t [ms]"}    # or {rate: 1000}, Hz, where the rows have no time
 //     motor_position: {column: Encoder, unit: deg}
 //     load_position:  {column: 7, unit: deg}                        # by number
-//     motor_velocity: {column: speeds, element: 3, unit: rad/s}     # of several numbers in a field, or of an
-//     array motor_torque:   {product: [{column: duty, unit: raw, bits: 16}, {column: supply, unit: V}],
-//     scale: 1e-4, unit: N m}
+//     motor_velocity: {column: speeds, element: 3, unit: rad/s}     # of several numbers in a field
+//     motor_torque:   {product: [{column: duty, unit: raw, bits: 16}, {column: supply, unit: V}],
+//                      scale: 1e-4, unit: N m}
 #pragma once
 
 #include <string>

@@ -4,7 +4,7 @@
 //
 // Reading is strict: what is not plainly right is refused with its place. A byte order mark, CRLF, spaces
 // around fields, empty lines at the end and a missing final line end are accepted. A repeated stamp loses the
-// later row; that, gaps and jitter are told in Record::warnings.
+// later row; that, gaps and jitter are reported in Record::warnings.
 //
 // A name may say its unit, `motor_position [deg]` (record/unit.h); without, it is the SI unit.
 //

@@ -25,10 +25,10 @@ struct DrivenPositions {
 
 /// The skew [s]; standard error from blocks left out, from half the bandwidth, and what such a model leaves
 /// wrong (0.05 ms, simulation). Throws CannotIdentify where the record is too short or its columns cannot be
-/// told apart.
+/// distinguished.
 signal::Measured encoder_skew(const DrivenPositions& positions);
 
-/// Whether a skew is told apart from zero: four standard errors.
+/// Whether a skew differs clearly from zero: four standard errors.
 bool is_clear(const signal::Measured& skew);
 
 /// The load's position and speed at the time of the motor's: moved by `skew` [s], cubic between samples of a

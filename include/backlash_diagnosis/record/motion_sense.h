@@ -23,9 +23,8 @@ struct DrivenMotion {
 /// - scale: load_position travels less than 0.8 or more than 1.25 times as far; motor and load swing against
 ///   each other more than ten times between two samples: time in other units; the inertia that takes the
 ///   torque is what degrees, N mm or the other side of the reduction would make of the declared.
-/// - swapped: torque is spent on the motion as position would be on that of the torque; the load runs ahead
-/// of
-///   the motor that accelerates it.
+/// - swapped: motor_torque moves as a position would under motor_position as torque;
+///   the load runs ahead of the motor that accelerates it.
 /// - dead: the torque is a function of the position alone, as no friction and no acceleration would leave it.
 /// Noted: scale, where the inertia is more than ten times what is declared, or less than a tenth, and no unit
 /// says why.

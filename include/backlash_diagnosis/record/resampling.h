@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <vector>
+
 #include "backlash_diagnosis/record/even_grid.h"
 #include "backlash_diagnosis/record/record.h"
 
@@ -14,6 +16,11 @@ Record evenly_sampled(const Record& record);
 /// The same with the rows that were not recorded, for those who leave them out; gaps up to kLongestFilled.
 EvenGrid evenly_sampled_grid(const Record& record);
 constexpr double kLongestFilled = 50;  ///< intervals; choice
+
+/// A record between its gaps of more than kLongestFilled intervals: each part a record of its own, with its
+/// start in its name; what is shorter than a tenth of the longest is left out, which the first one's warnings
+/// say.
+std::vector<Record> parts_between_gaps(Record record);
 
 /// The same at a longer interval [s], torques and speeds low-passed below half its rate. Throws
 /// InvalidParameter where it is shorter than the record's own.

@@ -2,7 +2,7 @@
 // Samples of one joint that come in several streams (an encoder of the motor on one topic, that of the link
 // on another) as samples at the stamps of the first stream: values of the others run straight between the two
 // neighbours of such a stamp. Knows stamps only, no clock. A stream that is late as a whole stays late: that
-// is an encoder_skew, which a record tells.
+// is an encoder_skew, which is estimated from a record.
 #pragma once
 
 #include <cstddef>
@@ -52,7 +52,8 @@ class SampleJoiner {
 };
 
 /// Records of one joint, with channels of their own and a common time 0, at the times of the first. Its
-/// `name` and all warnings are kept; samples that are left out are told. Throws BadData where none is left.
+/// `name` and all warnings are kept; samples that are left out are reported in them. Throws BadData where
+/// none is left.
 Record joined(const std::vector<Record>& parts);
 
 /// Counts the times of a record from another time 0 [s since 1970].
@@ -60,7 +61,7 @@ void set_origin(Record& record, double origin);
 
 /// Records of several joints on one time base: that of the first, where all have a sample on either side.
 /// Each says by its `origin` when its time 0 was. Records that have the same times already stay as they are.
-/// The first one's warnings tell what was left out. Throws BadData where nothing is left.
+/// The first one's warnings say what was left out. Throws BadData where nothing is left.
 void share_time_base(std::vector<Record>& joints);
 
 }  // namespace backlash::record

@@ -30,7 +30,7 @@ class StampChecker {
   std::size_t repeated() const { return repeated_; }
   double first_repeated() const { return first_repeated_; }  ///< s, valid where repeated() > 0
 
-  /// Tells a record what was dropped.
+  /// Adds what was dropped to the counts of a record.
   void count_into(Record& record) const;
 
   /// Warning for Record::warnings, empty where nothing was dropped; `where` names the place ("line 17") if

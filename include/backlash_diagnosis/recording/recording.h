@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Recordings of ROS 2, read without ROS 2: MCAP files (mcap.dev/spec, version 0) and rosbag2's SQLite files.
-// What the messages hold is told by cdr.h.
+// What the messages hold is read by cdr.h.
 #pragma once
 
 #include <cstdint>
@@ -37,8 +37,8 @@ class Recording {
   virtual std::vector<Topic> topics() = 0;
 
   /// The messages on some topics as they were received: SQLite by time stamp, MCAP chunk by chunk, sorted by
-  /// log time within each, files of a folder by their times. Of an MCAP file that is damaged those before the
-  /// damage, which warnings() then tell; else throws BadData "path: ..." with the row.
+  /// log time within each, files of a folder by their times. Of a file that is damaged those before the
+  /// damage, which warnings() then report; where nothing can be read throws BadData "path: ...".
   virtual void read(const std::vector<std::string>& topics, const Take& take) = 0;
 
   /// What an operator should know of the last read: a file that was cut off.

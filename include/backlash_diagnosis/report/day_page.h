@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One page of a day of a robot, from what its monitors kept: how much play each joint had, when that could be
-// told, and what has changed.
+// One page of a day of a robot, from what its monitors kept: how much play each joint had, when that was
+// estimated, and what has changed.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ namespace backlash::report {
 /// Of one joint what falls into the day.
 struct JointDay {
   std::string joint;
-  std::vector<diagnosis::HistoryEntry> estimates;  // told or not, the oldest first
+  std::vector<diagnosis::HistoryEntry> estimates;  // with and without a result, the oldest first
   std::vector<diagnosis::KnownChange> changes;     // that were so at some time of it, none withdrawn
   std::optional<double> silent_since;              // s since 1970: no entry since, up to the end or to now
 };
@@ -28,7 +28,7 @@ struct Day {
 };
 
 /// Whether an estimate says how much play there is.
-bool tells(const diagnosis::HistoryEntry& entry);
+bool has_play(const diagnosis::HistoryEntry& entry);
 
 /// The files of a folder that `~history` of diagnoser and change_watch filled: JOINT.csv, JOINT_changes.csv.
 /// `to` NaN: the day ends with the last entry of all, and how long ago that was at `now` is said. Throws

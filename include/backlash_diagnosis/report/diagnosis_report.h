@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What diagnose_record tells: as JSON for programs and as text for people.
+// What diagnose_record reports: as JSON for programs and as text for people.
 #pragma once
 
 #include <iosfwd>

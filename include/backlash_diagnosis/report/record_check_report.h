@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/record/record_check.h"
 
 namespace backlash::report {
@@ -35,6 +36,11 @@ std::string record_check_json(const CheckedFile& file, const std::vector<Serves>
 
 /// The same for people: a line per channel, per finding, per command and method.
 std::string record_check_text(const CheckedFile& file, const std::vector<Serves>& serves);
+
+/// What a plot of it shows (scripts/plot_check.py): the channels of the joints as they were recorded, in the
+/// order of `file`, and the report. Of long records the lowest and the highest of neighbouring samples.
+std::string record_check_series(const CheckedFile& file, const std::vector<record::JointRecord>& recorded,
+                                bool linear);
 
 /// A report with what the check of its records found, as "record_check".
 std::string with_record_check(const std::string& json, const std::vector<CheckedFile>& files);

@@ -10,7 +10,7 @@ struct DeclaredUncertainty {
   /// -, relative, of the compliance of a coupling: tolerance of a torsion spring with its clamps.
   static constexpr double kCoupling = 0.12;
   /// -, factor of the contact stiffness of a mesh and of what holds it: depends on tooth form, position and
-  /// width of contact, which no data sheet tells.
+  /// width of contact, which no data sheet states.
   static constexpr double kContactFactor = 2.5;
 };
 

@@ -20,9 +20,9 @@ struct Drive {
   struct Stage {
     long driving = 0, driven = 0;  // teeth
   };
-  double reduction_ratio = 0;  // motor turns per load turn; 0: not told
+  double reduction_ratio = 0;  // motor turns per load turn; 0: not stated
   std::vector<Stage> stages;   // from the motor to the load
-  long pole_pairs = 0;         // of the motor; 0: not told
+  long pole_pairs = 0;         // of the motor; 0: not stated
   bool wave_generator = false;
 };
 
@@ -31,15 +31,15 @@ struct TurningPart {
   double order;      // per turn of the load
 };
 
-/// `otherwise`: the ratio where the drive tells none. Throws BadData for teeth that contradict the ratio.
+/// `otherwise`: the ratio where the drive states none. Throws BadData for teeth that contradict the ratio.
 Drive read_drive(const YamlReader& drive, double otherwise);
 
-/// All that turns, the fastest last; empty of a drive that tells no ratio.
+/// All that turns, the fastest last; empty of a drive that states no ratio.
 std::vector<TurningPart> turning_parts(const Drive& drive);
 
 /// Which of the parts an order can be, a line of some 100 characters: "once per motor turn, 110; not ...".
 /// A part is meant where the order, within twice its standard error and a thousandth, is its order or up to
-/// the sixth multiple. Empty where the drive tells nothing.
+/// the sixth multiple. Empty where the drive states no parts.
 std::string part_of_order(const Drive& drive, double order, double standard_error);
 
 }  // namespace backlash::rig_file

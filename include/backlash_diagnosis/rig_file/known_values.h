@@ -24,8 +24,8 @@ namespace backlash::rig_file {
 /// RigFile::backlash_error. Throws BadData.
 void read_known_values(const YamlReader& yaml, RigFile& file);
 
-/// The rig file with the values of a commissioned machine in place of its own; what the records do not tell
-/// stays as it is. `source` says what they were identified from. Throws BadData, CannotIdentify.
+/// The rig file with the values of a commissioned machine in place of its own; what the records do not
+/// determine stays as it is. `source` says what they were identified from. Throws BadData, CannotIdentify.
 std::string commissioned_text(const RigFile& file, const diagnosis::WaveformCommissioning& found,
                               const std::string& source);
 

@@ -63,9 +63,10 @@ const std::vector<RigParameter>& servo_parameters();
 const RigParameter& servo_parameter(const std::string& name);
 const RigParameter& servo_parameter(RigPart part, ParameterKind kind);
 
-/// Whether the deflection of a machine tells it whose torque holds the coupling of other axes (Rig::coupled):
-/// skew, stiffness, and dry friction of the motor. Viscous friction acts like a skew.
-bool told_by_deflection(const RigParameter& parameter);
+/// Whether this parameter can be identified from the deflection of a machine whose torque holds the coupling
+/// of other axes (Rig::coupled): skew, stiffness, and dry friction of the motor. Viscous friction acts like a
+/// skew.
+bool shown_by_deflection(const RigParameter& parameter);
 
 /// The parameter that says how far the directions of this one differ; null: it has none.
 const RigParameter* asymmetry_of(const RigParameter& mean);

@@ -27,8 +27,8 @@ extern const ros::Time kBagTimeOrigin;  ///< 1e9 s: stamp of time 0 in written b
 /// `topic`: a topic that is this one, or whose last part is it ("/robot/joint_states"), is read.
 ///
 /// Messages are taken in the order of the bag. A repeated stamp loses the later message; that, gaps and
-/// jitter are told in Record::warnings. A channel that is NaN in all messages is absent. Record::name is the
-/// path as given.
+/// jitter are reported in Record::warnings. A channel that is NaN in all messages is absent. Record::name is
+/// the path as given.
 ///
 /// Throws MissingInput when the file cannot be opened. Throws BadData, naming the path and where it applies
 /// topic, message (from 0) and stamp, when it is no bag, is damaged or not indexed; has no such topic or

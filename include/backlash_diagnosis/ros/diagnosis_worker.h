@@ -33,7 +33,8 @@ struct DiagnosisTask {
 };
 
 /// Works through tasks in their order. Some may wait, so that a moment without processor time loses none;
-/// where it cannot keep up, a new task replaces all that wait, which is counted: what is told is never old.
+/// where it cannot keep up, a new task replaces all that wait, which is counted: what is reported is never
+/// old.
 class DiagnosisWorker {
  public:
   using Work = std::function<void(const DiagnosisTask&)>;

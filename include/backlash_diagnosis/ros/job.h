@@ -34,7 +34,7 @@ struct Job {
   BestSoFar best_so_far;           // may be empty, as `progress`
 };
 
-/// Runs a job and waits for it. The program tells how far it is as an option --feedback of the offline
+/// Runs a job and waits for it. The program reports its progress as the option --feedback of the offline
 /// commands does: {"fraction":0.5,"phase":"...","best":"..."} on each line of its standard output; other
 /// lines are passed over. Throws JobFailed; Cancelled within a second after `progress` wants no more.
 void run_job(const Job& job);

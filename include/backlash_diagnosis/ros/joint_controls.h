@@ -47,8 +47,8 @@ class JointControls {
 
   /// Before each sample: a torque_command that is too old is zero.
   void age_torque();
-  /// Tells what is in force where it was changed in another way than here.
-  void tell();
+  /// Publishes what is in force where it was changed in another way than here.
+  void publish();
   std::string true_backlash() const;  // with its unit, for people
 
  private:

@@ -27,7 +27,7 @@ class JointInputs {
   using OnSample = std::function<void(std::size_t joint, const ros::Time& stamp,
                                       const record::ChannelValues& values, const std::string& problem)>;
 
-  /// Takes a message of topics()[topic], and tells the samples that are complete with it.
+  /// Takes a message of topics()[topic], and passes on the samples that are complete with it.
   void take(std::size_t topic, const sensor_msgs::JointState& message, const OnSample& on_sample);
 
  private:

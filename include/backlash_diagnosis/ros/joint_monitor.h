@@ -103,7 +103,7 @@ class JointMonitor {
   /// Whether all that is kept is of one play: empty, or since when it is another one, in words.
   std::string change_of_play() const;
 
-  /// Ends the running estimates: the latest that waits is still told.
+  /// Ends the running estimates: the latest that waits is still reported.
   void stop() { worker_.stop(); }
 
   void set_baseline(const std::optional<diagnosis::Baseline>& baseline);

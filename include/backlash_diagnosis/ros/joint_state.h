@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A record as sensor_msgs/JointState and back, and how stamps become seconds. What is read is told by the
+// A record as sensor_msgs/JointState and back, and how stamps become seconds. What is read is given by the
 // channel map of each joint (record/channel_map.h, which also has the names that are written).
 //
 // A joint whose name is absent has none of its channels; a NaN, or an empty position, velocity or effort

@@ -18,7 +18,7 @@ struct Registrations {
 };
 
 /// Asks the master every `interval` [s of wall time] what it knows of this node. Where it knows nothing any
-/// more, tells it again what it knew last, and says so on the log; so also where the master does not answer.
+/// more, registers again what it knew last, and says so on the log; so also where the master does not answer.
 class MasterWatch {
  public:
   explicit MasterWatch(double interval = 1);
@@ -34,7 +34,7 @@ class MasterWatch {
   std::condition_variable changed_;
   bool stop_ = false;
   bool away_ = false;     // the master did not answer the last time
-  bool complete_ = true;  // it took all that it was told
+  bool complete_ = true;  // it took all registrations
   Registrations known_;
   std::thread thread_;
 };

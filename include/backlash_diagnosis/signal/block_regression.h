@@ -27,7 +27,7 @@ struct PredictedShare {
 
 /// Of y, by a ridge regression over the columns of `features`: each block (numbers from 0, one per row) is
 /// predicted by a fit to all others, at the ridge that predicts best. Blocks should be longer than the
-/// correlation of y: else neighbours of a sample foretell its noise. Nothing is predicted of fewer than four
+/// correlation of y: else neighbours of a sample predict its noise. Nothing is predicted of fewer than four
 /// blocks. Hoerl and Kennard (1970), Stone (1974).
 PredictedShare predicted_share(const Eigen::MatrixXd& features, const Eigen::VectorXd& y,
                                const std::vector<int>& block, const BlockRegressionSettings& settings = {});

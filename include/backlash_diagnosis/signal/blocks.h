@@ -28,7 +28,7 @@ std::pair<std::size_t, std::size_t> steady_range(const std::vector<double>& valu
 /// How the least squares solution of A x = b changes where one block of rows after the other is left out: one
 /// column per block, about their mean. `residuals` b - A x at the solution; `block` the number of each row's
 /// block, 0 ... Throws CannotIdentify with fewer than four blocks, and where without one of them the unknowns
-/// cannot be told apart.
+/// cannot be distinguished.
 Eigen::MatrixXd jackknife_changes(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
                                   const std::vector<std::size_t>& block);
 

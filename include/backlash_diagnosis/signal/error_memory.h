@@ -17,8 +17,8 @@ struct ErrorMemory {
 /// The errors are taken as an independent part and one that forgets exponentially (a first-order
 /// autoregression in continuous time; for uneven spacing as Robinson 1977 and Mudelsee 2002). Share and time
 /// constant come from the restricted likelihood (Patterson and Thompson 1971: the plain one makes errors
-/// about a fitted line look more independent than they are), by a Kalman filter (Jones 1981). Few points do
-/// not tell them well: the variances are averaged over a grid of both by their likelihood. The variance of
+/// about a fitted line look more independent than they are), by a Kalman filter (Jones 1981). A few points
+/// hardly determine them: the variances are averaged over a grid of both by their likelihood. The variance of
 /// Kendall's statistic grows as in Hamed and Rao (1998), with Pearson's in place of the rank correlation,
 /// which is at most 2 % smaller.
 ErrorMemory error_memory(const std::vector<double>& times, const std::vector<double>& residuals);

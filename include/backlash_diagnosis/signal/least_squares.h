@@ -34,7 +34,7 @@ LeastSquaresFit fit_robust(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 /// Residuals of a model at given parameters, each divided by its own standard deviation.
 using ResidualFunction = std::function<Eigen::VectorXd(const Eigen::VectorXd& parameters)>;
 
-/// Told the points, at most kPointsAtOnce, at which the residuals are asked for next: what they have in
+/// Receives the points, at most kPointsAtOnce, at which the residuals are asked for next: what they have in
 /// common may be computed at once.
 using AheadFunction = std::function<void(const std::vector<Eigen::VectorXd>& points)>;
 constexpr int kPointsAtOnce = 16;

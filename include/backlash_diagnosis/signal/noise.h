@@ -35,7 +35,7 @@ struct NoiseRange {
 /// second.
 NoiseRange estimate_noise(const std::vector<double>& signal, double samples_per_period);
 
-/// The range widened by two standard errors of an estimate from `samples` samples: each stretch of 10 tells
+/// The range widened by two standard errors of an estimate from `samples` samples: a stretch of 10 gives
 /// the standard deviation to about one half, see test_noise.cpp.
 NoiseRange with_standard_error(const NoiseRange& range, std::size_t samples);
 

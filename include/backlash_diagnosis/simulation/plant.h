@@ -12,7 +12,7 @@
 
 namespace backlash::simulation {
 
-/// Where the contact law depends on how a contact began, each touch of a flank is found, told to the gear
+/// Where the contact law depends on how a contact began, each touch of a flank is found, passed to the gear
 /// train and started from; other laws are simply integrated through. Dry friction likewise: each standstill
 /// and each break-away is found, so that a body that sticks stays exactly where it is.
 class Plant {

@@ -3,8 +3,8 @@
 //
 // At each backlash of a grid and each level of one disturbance that the curve does not know of, the machine
 // is simulated, recorded a few times (other start within a period, other noise) and diagnosed with the curve
-// of the undisturbed machine. The change of skewness that the disturbance alone causes is also told as the
-// backlash that would cause it:
+// of the undisturbed machine. The change of skewness that the disturbance alone causes is also reported as
+// the backlash that would cause it:
 //   equivalent = (skewness(backlash, level) - skewness(backlash, none)) / slope
 // slope: of the whole curve, by least squares. It is the error of a user who reads backlash from the bare
 // curve, as Sarkar, Ellis and Moore (1997, Section 9.1) do; the methods also check whether the record can be

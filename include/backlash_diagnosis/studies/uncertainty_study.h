@@ -52,12 +52,12 @@ std::vector<StudyTrial> run_study(const rig_file::RigFile& file, const diagnosis
 /// Results of a method over a group of trials.
 struct StudyRow {
   std::string method;
-  int trials = 0, told = 0;                      // told: status ok
-  double median_error = kNaN, p95_error = kNaN;  // m, of |estimate - truth|, where told
-  double median_width = kNaN;                    // m, of the interval, where told
-  double coverage = kNaN;                        // share of intervals that hold the truth, where told
-  int wrong_and_sure = 0;     // told, and the truth outside of the interval by more than twice its width, or
-                              // by more than 10 um and a fifth of the truth
+  int trials = 0, answered = 0;                  // answered: status ok
+  double median_error = kNaN, p95_error = kNaN;  // m, of |estimate - truth|, where answered
+  double median_width = kNaN;                    // m, of the interval, where answered
+  double coverage = kNaN;                        // share of intervals that contain the truth, where answered
+  int wrong_and_sure = 0;  // answered, and the truth outside of the interval by more than twice its width, or
+                           // by more than 10 um and a fifth of the truth
   double cannot_tell = kNaN;  // share of trials without status ok
 };
 

@@ -126,7 +126,7 @@ void describe_machine(const SearchResult& result, const std::vector<ServoPredict
 /// The torque of a machine that is coupled to other axes cannot be told.
 void forget_torque(Trace& trace) {
   const double unknown = std::nan("");
-  trace.channels.at("torque") = {unknown, unknown, unknown, unknown, unknown};
+  trace.channels.at("torque") = {unknown, unknown, unknown, unknown, unknown, {}, false};
   auto& all = trace.independence;
   all.erase(
       std::remove_if(all.begin(), all.end(), [](const Independence& i) { return i.channel == "torque"; }),
@@ -149,11 +149,13 @@ void describe_errors(const SearchResult& result, const std::vector<ServoPredicti
   const auto channel = [&](const std::string& name, ChannelError ServoPrediction::*of, double sensors,
                            double repeats) {
     const double sensor_floor = (after.*of).floor;
-    trace.channels[name] = {(before.*of).error, (after.*of).error,
+    trace.channels[name] = {(before.*of).error,
+                            (after.*of).error,
                             sensors > 0 ? sensor_floor * std::max(1.0, repeats / sensors) : sensor_floor,
                             train_error(base, records.train, fit, of),
-                            train_error(last, records.train, fit, of)};
-    trace.channels[name].repeats = repeats > 0;
+                            train_error(last, records.train, fit, of),
+                            {},
+                            repeats > 0};
   };
   const Predicted unseen{&records.test, after};
   channel("torque", &ServoPrediction::torque_error, after.torque_floor, repeated_noise(unseen, false));

@@ -16,7 +16,7 @@ namespace {
 /// All that the rig declares, of the bodies and the mesh that it has.
 bool can_be_fitted(const rig_file::RigParameter& p, const model::Rig& rig) {
   if (p.kind == rig_file::ParameterKind::start_in_gap || !p.known_to(rig)) return false;
-  if (rig.coupled && !rig_file::told_by_deflection(p)) return false;
+  if (rig.coupled && !rig_file::shown_by_deflection(p)) return false;
   if (p.part == rig_file::RigPart::link && !simulation::load_moves_freely(rig)) return false;
   return p.get(rig) != 0 || p.kind == rig_file::ParameterKind::encoder_skew;
 }

@@ -6,10 +6,10 @@
 
 namespace backlash::identification {
 
-/// A torque that seems to act more than a quarter of a sample before a held one would is that of the moment.
+/// A torque that seems to act over a quarter of a sample earlier than a held one is that of the moment.
 void release_hold(Machine& machine);
 /// The reverse: a torque of the moment that seems to act more than a quarter of a sample later is held. Asked
-/// once an effect has been added that the delay may have been fitted in place of.
+/// once an effect has been added that the delay may have stood in for.
 void restore_hold(Machine& machine);
 
 /// Where a delay is longer than `longest` [samples] that much stays and is fitted no more, so that the rest
@@ -23,7 +23,7 @@ double middle_offset(const ServoData& record);
 /// No delay by calibration, where a term of the model is the delay.
 void without_calibration(Machine& machine);
 
-/// Puts the mean delay of the calibrations into the last term, a delay, and leaves none to calibration.
+/// Moves the mean delay of the calibrations into the last term, a delay.
 /// `interval` [s] between samples.
 void move_delay_to_term(Machine& machine, double interval);
 

@@ -15,7 +15,7 @@ constexpr double kEdge = 0.04;  // simulation: of the gap; what is borne out har
 constexpr double kClear =
     6;  // simulation: deviations of white noise; 4 come by chance, a real onset has 15 to 21
 
-/// Takes from the damping what it lacks at small penetration.
+/// A term that takes away the share of the damping that is missing at small penetration.
 class Onset : public model::Term {
  public:
   Onset(double damping, double distance) : damping_(damping), distance_(distance) {
@@ -53,8 +53,8 @@ Eigen::VectorXd shift_of_contact_edge(const MachineFit& fit, const RecordSet& re
   const auto rows = scaled.topRows(now.size());
   const Eigen::VectorXd moved = -signal::solve_symmetric(signal::gram(scaled), rows.transpose() * change);
   const Eigen::VectorXd own = change + rows * moved;
-  const double told = own.dot(now) / own.norm() / (now.norm() / std::sqrt(double(now.size())));
-  if (!(std::fabs(told) > kClear)) return Eigen::VectorXd::Zero(moved.size());
+  const double in_errors = own.dot(now) / own.norm() / (now.norm() / std::sqrt(double(now.size())));
+  if (!(std::fabs(in_errors) > kClear)) return Eigen::VectorXd::Zero(moved.size());
   return unit.cwiseProduct(moved) * (-own.dot(now) / own.squaredNorm());
 }
 

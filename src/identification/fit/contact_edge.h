@@ -10,10 +10,11 @@ namespace backlash::identification {
 /// (Hunt and Crossley 1975), but how the damping sets in is not declared. Let it grow with the penetration p
 /// up to p0, a part of the gap,
 ///   b p' min(1, p / p0)
-/// and c be what that changes of the residuals r. This gives by how much the fitted values move with as much
+/// and c be the change of the residuals r by it. This gives by how much the fitted values move with as much
 /// of it as the records bear out,
 ///   s = -(J' J)^-1 J' c a,   a = -(c* . r) / (c* . c*)     c* the part of c that no value explains
-/// 0 where a is not told from chance, the teeth have no such damper or there is no load of its own.
+/// 0 where a does not differ clearly from chance, the teeth have no such damper or there is no load of its
+/// own.
 Eigen::VectorXd shift_of_contact_edge(const MachineFit& fit, const RecordSet& records);
 
 }  // namespace backlash::identification

@@ -29,7 +29,7 @@ std::vector<std::function<double(const model::Rig&)>> rows_as_declared(const mod
   std::vector<std::function<double(const model::Rig&)>> rows;
   for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     const double value = p.get(declared);
-    if (!rig_file::told_by_deflection(p) || !p.positive() || !(value > 0)) continue;
+    if (!rig_file::shown_by_deflection(p) || !p.positive() || !(value > 0)) continue;
     if (p.kind == rig_file::ParameterKind::stiffness) {
       rows.emplace_back([get = p.get, value](const model::Rig& rig) {
         return std::log(get(rig) / value) / std::log(kDeclaredStiffness);
@@ -47,7 +47,7 @@ FitParameter term_parameter(std::size_t term, const std::string& name, const mod
   const std::string id = rig.terms.at(term)->id;
   for (const ParameterSpec& spec : model::term_type(id).parameters) {
     if (spec.name != name) continue;
-    // A step of the fit beyond what the term can be is one to its bound.
+    // A step of the fit beyond the range of the term goes to its bound.
     const auto set = [term, name, most = spec.range.upper](model::Rig& changed, double value) {
       ParameterValues values = changed.terms[term]->values;
       values[name] = std::min(value, most);

@@ -23,7 +23,8 @@ struct FitParameter {
 FitParameter machine_parameter(const std::string& name, const model::Rig& rig);
 
 /// What is declared of friction and stiffness, one row each in standard deviations: where a deflection is all
-/// that is told, friction and skew of the encoders look alike, and a stiff machine hardly shows how stiff.
+/// that is predicted, friction and skew of the encoders look alike, and a stiff machine hardly shows how
+/// stiff.
 std::vector<std::function<double(const model::Rig&)>> rows_as_declared(const model::Rig& declared);
 
 /// A number of the term at this place of rig.terms; `scale` as above. One that may not be negative, and is

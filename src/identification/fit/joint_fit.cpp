@@ -82,7 +82,7 @@ signal::AheadFunction ahead(const Unknowns& unknowns, const RecordSet& records) 
   };
 }
 
-/// A logarithm that approaches kFarthest either way.
+/// A logarithm that approaches kFarthest on either side.
 double limited(double logarithm) {
   const double most = std::log(kFarthest);
   return most * std::tanh(logarithm / most);
@@ -108,7 +108,7 @@ double skew_of_friction(const model::Rig& rig) {
   return rig.coupled ? kDeclaredUncertainty * rig.motor.viscous_damping / stiffness : 0;
 }
 
-/// What samples cannot tell of a delay, `interval` [s] apart.
+/// What samples `interval` [s] apart do not show of a delay.
 void add_timing(MachineFit& fit, const Machine& start, double interval) {
   const std::string& skew =
       rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew).name;
@@ -123,7 +123,7 @@ void add_timing(MachineFit& fit, const Machine& start, double interval) {
   }
 }
 
-/// A machine whose load is simulated is told no better than it is simulated.
+/// A machine whose load is simulated is known no better than it is simulated.
 void add_equations(MachineFit& fit, const Machine& start) {
   if (!simulation::load_moves_freely(start.rig)) return;
   for (std::size_t i = 0; i < start.parameters.size(); ++i)
@@ -131,12 +131,12 @@ void add_equations(MachineFit& fit, const Machine& start) {
       fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) += std::pow(kEquations, 2);
 }
 
-/// What lies beyond noise, of what is this many times as large.
+/// The part beyond noise of a residual so many times the noise.
 double share_beyond_noise(double in_floors) {
   return std::sqrt(std::max(0.0, 1 - 1 / (in_floors * in_floors)));
 }
 
-/// What is left beyond noise, `left`, may follow what a value changes: it must not be told better than
+/// What is left beyond noise, `left`, may follow what a value changes: it must not be known better than
 /// |left| / |change per unit|, or than it is known beside the `rows` of the records.
 void allow_for_left(signal::LeastSquaresFit& fit, Eigen::Index rows, double left) {
   Eigen::VectorXd growth = Eigen::VectorXd::Ones(fit.values.size());
@@ -388,18 +388,18 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
 
 void allow_for_misfit(MachineFit& fit, const RecordSet& records) {
   const Misfit misfit = records.misfit(fit.machine);
-  if (fit.machine.rig.coupled || std::max(misfit.torque, misfit.deflection) <= kMisfit) return;
+  if (fit.machine.rig.coupled || std::max(misfit.torque, misfit.deflection) <= kShowsMissingEffect) return;
   const std::vector<RecordSet::Row>& layout = records.layout();
   const Eigen::Index n = fit.fit.values.size(), rows = Eigen::Index(layout.size());
-  // Of the records and what keeps a value that they do not tell; what procedures found in the same records is
-  // no more certain.
+  // Rows of the records and of priors for values that these do not determine; what procedures found in the
+  // same records is no more certain.
   const Eigen::MatrixXd j = fit.fit.jacobian.topRows(rows + n);
   const Eigen::MatrixXd gain = signal::symmetric_inverse(j.transpose() * j) * j.topRows(rows).transpose();
   Eigen::VectorXd drawn = Eigen::VectorXd::Zero(n);
   double all_left = 0;
   for (const bool deflection : {false, true}) {
     const double in_floors = deflection ? misfit.deflection : misfit.torque;
-    if (in_floors <= kMisfit) continue;
+    if (in_floors <= kShowsMissingEffect) continue;
     double squares = 0;
     Eigen::VectorXd gains = Eigen::VectorXd::Zero(n);
     for (Eigen::Index i = 0; i < rows; ++i) {

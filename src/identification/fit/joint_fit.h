@@ -62,7 +62,7 @@ class RecordSet {
   RecordSet of_others(const std::vector<ServoData>& data) const;
 
   Eigen::VectorXd rows(const model::Rig& rig, const std::vector<Calibration>& calibrations) const;
-  /// Saves time where the rows of these are asked for next.
+  /// Simulates them together, which saves time where their rows are asked for next.
   void prepare(const std::vector<Machine>& machines) const;
 
   struct Row {
@@ -89,7 +89,7 @@ struct MachineFit {
   Eigen::VectorXd reach;        // of the errors of small values (reach.h); empty before judge_errors()
 };
 
-/// Of a positive value over its start: where its bound is reached to a hundredth.
+/// A positive value over its start at which its bound is reached to a hundredth.
 double farthest_logarithm();
 
 /// The numbers that a fit changes: parameters (of those that are positive the logarithm, relative to the
@@ -100,10 +100,10 @@ class Unknowns {
   Eigen::Index size() const { return Eigen::Index(start_.parameters.size() + per_record_ * records()); }
   Eigen::VectorXd values() const;
   Eigen::VectorXd scale() const;
-  /// Throws InvalidParameter for what is refused by the rig.
+  /// Throws InvalidParameter for values that the rig refuses.
   model::Rig rig(const Eigen::VectorXd& values) const;
   std::vector<Calibration> calibrations(const Eigen::VectorXd& values) const;
-  /// One row per value: a wide prior about its start, so that what the records do not tell stays there.
+  /// One row per value: a wide prior about its start, so that what the records do not determine stays there.
   Eigen::VectorXd prior(const Eigen::VectorXd& values) const;
   Machine machine(const Eigen::VectorXd& values) const;
   std::map<std::string, signal::Measured> parameters(const MachineFit& fit) const;
@@ -127,10 +127,10 @@ MachineFit fit_machine(const Machine& start, const RecordSet& records, signal::N
 /// error. Of a machine that is coupled to other axes also what is left counts as if it followed each value.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
-/// An effect that the model lacks (kMisfit) may follow what a value changes, and draws it without a trace: no
-/// value is told better than by what would change the records as much as all that is left of such channels,
-/// or, with all others fitted, as three tenths of it. Nothing is done to a machine that is coupled:
-/// judge_errors() has allowed for it.
+/// An effect that the model lacks (kShowsMissingEffect) may follow what a value changes, and draws it without
+/// a trace: no value is known better than by what would change the records as much as all that is left of
+/// such channels, or, with all others fitted, as three tenths of it. Nothing is done to a machine that is
+/// coupled: judge_errors() has allowed for it.
 void allow_for_misfit(MachineFit& fit, const RecordSet& records);
 
 }  // namespace backlash::identification

@@ -31,8 +31,8 @@ signal::NonlinearOptions fit_options(const FitSettings& settings, double toleran
 BandFit fit_in_band(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
                     const FitSettings& settings);
 
-/// The same again and again from where it has ended, until the weights no longer change: those of a start
-/// that lacks an effect, or is far off, hold what it leaves and not the noise.
+/// The same again from where it has ended, until the weights no longer change: the weights of a start
+/// that lacks an effect, or is far off, come from its residual and not from the noise.
 BandFit fit_settled(const std::vector<ServoData>& data, const Machine& start, double cutoff, double tolerance,
                     const FitSettings& settings);
 

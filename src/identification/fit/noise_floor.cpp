@@ -22,7 +22,7 @@ double low_pass_gain(double frequency, double cutoff, double interval) {
   return 1 / (1 + std::pow(std::tan(M_PI * frequency * interval) / std::tan(M_PI * cutoff * interval), 8));
 }
 
-/// Not more than the median of fourth differences tells: the spectrum ends in noise where a signal is sampled
+/// Not more than the median of fourth differences gives: the spectrum ends in noise where a signal is sampled
 /// fast; where it is not, the motion after a reversal reaches to its end, which that median hardly feels.
 double by_median(const std::vector<double>& values, double spectral) {
   const double median = signal::noise_from_differences(values, 4);

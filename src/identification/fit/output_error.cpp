@@ -41,8 +41,8 @@ bool is_play(const FitParameter& p) {
   return p.name == rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::backlash).name;
 }
 
-/// Teeth without play are another machine than those with a little: no force jumps when they change flanks.
-/// So where the play vanishes it is held against the one with some. Nothing where that leaves less.
+/// Teeth without play differ from those with a little: no force jumps when they change flanks.
+/// So where the play vanishes it is compared with the fit that has some. Nothing where that leaves less.
 std::optional<BandFit> without_play(const BandFit& fitted, const std::vector<ServoData>& records,
                                     const FitSettings& settings) {
   Machine machine = fitted.start;

@@ -18,7 +18,7 @@ constexpr double kSteps = 2;  // choice: factor from one value that is tried to 
 constexpr int kHalvings = 4;  // choice (time): of the last step, in logarithms
 constexpr int kRefits = 3;    // choice (time): of the other values, at each
 
-/// What the rows grow by at other values of one, with all others fitted anew along their columns.
+/// By how much the rows grow at another value of one, with all others fitted anew along their columns.
 class Profile {
  public:
   Profile(const MachineFit& fit, Eigen::Index i, RowsOf rows, Eigen::Index count)

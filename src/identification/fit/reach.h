@@ -3,11 +3,11 @@
 //
 // The error of a logarithm says nothing of a value near zero, or of one that nothing excites (a play of which
 // one flank only is seen: another play and other zeros of the encoders are the same record). There no slope
-// counts but what a large step changes: the smallest p' > p with
+// counts, only what a large step changes: the smallest p' > p with
 //
 //   min over all other values of |r(p')|^2 - |r(p)|^2 >= (2 g)^2
 //
-// r the rows of the records, each of variance 1, the other values moved along their columns, g by how much
+// r: the rows of the records, each of variance 1, the other values moved along their columns; g: by how much
 // neighbouring rows that are not independent widen the errors of the other values. (p' - p) / 2 counts as an
 // error.
 #pragma once

@@ -121,7 +121,7 @@ std::vector<double> rounded(std::vector<double> position, double step, double ph
   return position;
 }
 
-/// Values that the fit takes from records of its own machine, less what it is made of.
+/// Values that the fit finds in records of its own machine, minus the true ones.
 Eigen::VectorXd moved_by(const std::vector<ServoData>& data, const MachineFit& fit,
                          const RecordSet& records) {
   const Eigen::VectorXd rows = records.of_others(data).rows(fit.machine.rig, fit.machine.calibrations);

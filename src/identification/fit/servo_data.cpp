@@ -18,8 +18,8 @@
 namespace backlash::identification {
 namespace {
 
-constexpr std::size_t kStart = 10;        // samples, choice: of the line that the load's start is taken from
-constexpr std::size_t kLeastToTell = 64;  // samples, theory: for the noise of a position (bandwidth.h)
+constexpr std::size_t kStart = 10;  // samples, choice: of the line that the load's start is taken from
+constexpr std::size_t kLeastForNoise = 64;  // samples, theory: for the noise of a position (bandwidth.h)
 constexpr double kRateNoise =
     0.95;  // theory: of a five-point difference of white noise of deviation 1, per sample
 constexpr double kClear = 0.02;  // choice: of the speed: noise that does not hide its direction
@@ -165,7 +165,7 @@ ServoData servo_data(const record::EvenGrid& grid, const model::Rig& rig, double
   data.torque = scaled(record, record::Channel::motor_torque, ratio);
   data.motor = scaled(record, record::Channel::motor_position, 1 / ratio);
   data.motor_rate = fast_derivative(data.motor, data.interval);
-  const double noise = data.size() >= kLeastToTell ? signal::position_noise(data.motor) : 0;
+  const double noise = data.size() >= kLeastForNoise ? signal::position_noise(data.motor) : 0;
   data.rate_noise = kRateNoise * noise / data.interval;
   if (!simulation::load_moves_freely(rig)) {
     const double rounding = signal::resolution(data.motor) / std::sqrt(12.0);  // of a slow motion not white

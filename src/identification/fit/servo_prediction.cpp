@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a rig says of a record: torque and deflection, and what is left of them.
+// Torque and deflection that a rig predicts for a record, and the residuals.
 #include "servo_prediction.h"
 
 #include <algorithm>
@@ -202,7 +202,7 @@ class SimulatedLoads {
   }
 
  private:
-  // That a Jacobian's columns come upon the load of its centre, and upon those that were prepared.
+  // So that a Jacobian's columns find the load of its centre, and those that were prepared.
   static constexpr std::size_t kKept = signal::kPointsAtOnce + 2;
 
   std::shared_ptr<const SimulatedLoad> find(const model::Rig& acting, const Drive& drive) {
@@ -248,8 +248,8 @@ PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, dou
   leave_out_lost(drawn);
 }
 
-/// What was not recorded, what a low-pass makes of it, and behind more than a sample what the load does that
-/// was driven by it.
+/// Left out: what was not recorded, what a low-pass makes of it, and after more than a sample the motion of
+/// the load that was driven by it.
 void PreparedServo::leave_out_lost(bool drawn) {
   const std::vector<bool>& lost = data_->lost;
   const long n = static_cast<long>(lost.size());
@@ -278,7 +278,7 @@ std::vector<double> PreparedServo::acting_torque(const model::Rig& rig,
 /// Of a machine whose torque holds the coupling of other axes. That torque, less what the motor takes, goes
 /// through the teeth all the same:
 ///   q_L = q_M - e(tau - J_M a_M - friction)
-/// so that the load's position follows, and the torque itself cannot be told.
+/// so that the load's position follows, and the torque itself cannot be predicted.
 ServoResiduals PreparedServo::coupled_residuals(const model::Rig& rig, const Calibration& calibration) const {
   const ServoData& d = data();
   const model::GearTrain train(rig);

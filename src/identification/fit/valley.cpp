@@ -17,7 +17,7 @@ constexpr double kBeside = 0.1;      // choice: of the logarithms, to either sid
 constexpr int kOtherEnds = 3;        // choice (time)
 constexpr double kHardlyMore = 1.1;  // choice: of the sum of squares
 
-/// 1 where the rows tell all values apart, 0 where two are one.
+/// 1 where the rows distinguish all values, 0 where two are one.
 double flatness(const Eigen::MatrixXd& jacobian) {
   const Eigen::MatrixXd scaled = jacobian * jacobian.colwise().norm().cwiseInverse().asDiagonal();
   const Eigen::MatrixXd normal = scaled.transpose() * scaled;

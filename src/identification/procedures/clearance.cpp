@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/procedures/flank_fit.h"
+#include "backlash_diagnosis/identification/procedures/clearance_flanks.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
@@ -24,7 +24,7 @@ constexpr double kOutlier = 3;        // choice: of the median deviation
 constexpr int kPushes[] = {2, 3};     // choice: degrees of the push over J
 constexpr double kSlow = 0.2;         // choice: of the fastest: below it friction changes
 constexpr double kSensitive = 0.05;   // choice: of the gap, between the two pushes: worth a warning
-constexpr double kUncertain = 0.25;   // choice: of the gap: beyond it is not told
+constexpr double kUncertain = 0.25;   // choice: of the gap: beyond which none is reported
 constexpr double kFlanks = 1.3;       // simulation: by which flanks must better the fit
 constexpr int kLeastSamples = 20;     // choice: of a passage
 
@@ -108,7 +108,7 @@ signal::Extent extent_of(const Values& values, const Stretch& s) {
   return signal::extent(values, static_cast<std::size_t>(s.begin), static_cast<std::size_t>(s.end));
 }
 
-/// One passage with the contact of all.
+/// One passage, with the contact that all passages share.
 std::optional<GapPassage> measure(const Run& run, const Stretch& s, const FlankContact& contact, int push) {
   GapPassage p;
   p.time.assign(run.time.begin() + s.begin, run.time.begin() + s.end);
@@ -177,7 +177,7 @@ PassageFit fit_all(const Run& run, const std::vector<Stretch>& stretches, double
   return fit_flanks(passages, signal::quantile(lows, 0.5), signal::quantile(highs, 0.5), known);
 }
 
-/// Fits all, leaves out what does not fit, fits again.
+/// Fits all passages, leaves out those that do not fit, fits again.
 Passages fit_without_outliers(const Run& run, std::vector<Stretch> stretches, double stiffness, int push,
                               int least) {
   Passages p;
@@ -250,10 +250,10 @@ Clearance identify_clearance(const record::Record& record, const ClearanceSettin
                     by_push[1].fit.without_flanks, by_push[1].fit.deviation));
   c.gap = {0.5 * (gaps[0].value + gaps[1].value), std::hypot(noise, difference)};
   if (c.gap.standard_error > kUncertain * c.gap.value)
-    throw CannotIdentify(
-        fmt::format("the passages do not tell flank from push: {:.4g} rad with a parabola, {:.4g} rad with a "
-                    "cubic, error {:.4g} rad",
-                    gaps[0].value, gaps[1].value, noise));
+    throw CannotIdentify(fmt::format(
+        "the passages do not distinguish flank from push: {:.4g} rad with a parabola, {:.4g} rad with a "
+        "cubic, error {:.4g} rad",
+        gaps[0].value, gaps[1].value, noise));
   const Passages& p = by_push[1];
   c.passages = p.measured;
   c.lower = p.fit.flanks.lower;
@@ -270,7 +270,7 @@ Clearance identify_clearance(const record::Record& record, const ClearanceSettin
         "the load seems to meet no damping on the flanks: they are touched too softly, distrust the gap");
   if (difference > kSensitive * c.gap.value)
     c.warnings.push_back(fmt::format(
-        "the gap hangs on how the push is modelled: {:.4g} rad with a parabola, {:.4g} rad with a cubic",
+        "the gap depends on how the push is modelled: {:.4g} rad with a parabola, {:.4g} rad with a cubic",
         gaps[0].value, gaps[1].value));
   return c;
 }

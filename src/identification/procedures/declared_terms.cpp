@@ -8,7 +8,7 @@
 namespace backlash::identification {
 namespace {
 
-/// All that the motor has to overcome but the inertia.
+/// Everything that the motor has to overcome, except inertia.
 std::vector<double> resistance(const ServoData& data, const model::Rig& rig) {
   simulation::RecordedMotion motion;
   motion.interval = data.interval;

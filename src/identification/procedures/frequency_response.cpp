@@ -67,7 +67,7 @@ double sinc(double x) {
   return x == 0 ? 1 : std::sin(x) / x;
 }
 
-/// What sampling makes of the response of an inertia: a gain, and what images of the hold add.
+/// What sampling does to the response of an inertia: a gain, and the images of the hold.
 struct Sampling {
   double gain = 1, images = 0;
 };

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kSameSpeed = 0.01;  // choice: relative: speeds closer than this count as one
 constexpr double kSurprise = 0.01;   // choice: chance of so much curvature on a straight line, that is worth
-                                     // telling, or of a row so far off among all
+                                     // a warning, or of a row so far off among all
 
 struct Rows {
   Eigen::VectorXd speed, torque, error;

@@ -90,8 +90,8 @@ std::vector<std::pair<double, double>> averaged(const Run& run, double width) {
   return means;
 }
 
-/// Slope of motor over load position. Over a turn and more the centre line repeats and is told from the slope
-/// by its first orders; over less they are one.
+/// Slope of motor over load position. Over a turn and more the centre line repeats and is separated from the
+/// slope by its first orders; over less they are one.
 void measure_scale(Run& run, double width) {
   const auto means = averaged(run, width);
   const double travel = means.back().first - means.front().first;
@@ -265,7 +265,7 @@ void say(GapMap& map) {
   }
 }
 
-/// From the runs what of the gap does not turn with the load.
+/// The part of the gap that does not turn with the load, from the runs.
 void take_waves_out(GapMap& map, Run& forward, Run& reverse, const GapMapSettings& settings) {
   GapWaveSettings of_waves;
   of_waves.drive = settings.drive ? &*settings.drive : nullptr;

@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
-#include <limits>
-#include <map>
 #include <numeric>
 #include <optional>
 
@@ -16,6 +14,7 @@
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/spectrum.h"
+#include "gap_cells.h"
 
 namespace backlash::identification {
 namespace {
@@ -23,106 +22,18 @@ namespace {
 constexpr double kTurn = 2 * M_PI;
 constexpr double kLeastTurns = 1.02;   // theory: a turn and some of it twice, else whole orders say it all
 constexpr double kCellsPerWave = 6;    // choice: of the highest order
-constexpr int kLeastSamples = 3;       // choice: per cell and run
-constexpr double kLopsided = 0.25;     // choice: of a cell, between the mean places of both runs
 constexpr std::size_t kMostWaves = 8;  // choice
 constexpr int kMultiples = 3;          // choice: k, harmonics of the pinion
 constexpr int kSides = 2;              // choice: n, to either side
 constexpr double kPerLine = 3;         // theory: trial orders per line of the spectrum, 1 / turns
 constexpr double kSame = 3;            // theory: standard errors
 constexpr double kScale = 1e-3;        // choice: of the order, as far as an encoder's scale may be off
-constexpr double kBeside = 1e-6;       // choice: share of a wave beside the whole orders, to tell it by
+constexpr double kBeside = 1e-6;       // choice: share of a wave beside the whole orders, to know it by
 constexpr double kWhole = 0.02;        // choice: orders so near a whole one are the load's
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// What is fitted: the separation of the flanks over places that both runs visited, or each run over its own
-/// places, where `apart`.
-struct Cells {
-  VectorXd place, value;  // rad
-  VectorXd share;         // -, of the gap in the value: 1, or half with the sign of the run
-  bool apart = false;
-  double width = 0;  // rad
-  double turns = 0;  // of the load, of either run where apart
-  double freedom() const { return double(value.size()); }
-};
-
-struct Mean {
-  double load = 0, difference = 0;
-  int count = 0;
-};
-
-std::map<long, Mean> means_of(const GapRun& run, double width) {
-  std::map<long, Mean> means;
-  for (std::size_t i = 0; i < run.load.size(); ++i) {
-    Mean& m = means[std::lround(run.load[i] / width)];
-    m.load += run.load[i], m.difference += run.difference[i], ++m.count;
-  }
-  return means;
-}
-
-VectorXd vector_of(const std::vector<double>& values) {
-  return Eigen::Map<const VectorXd>(values.data(), Index(values.size()));
-}
-
-Cells shared_cells(const GapRun& forward, const GapRun& reverse, double width) {
-  const std::map<long, Mean> f = means_of(forward, width), r = means_of(reverse, width);
-  std::vector<double> place, separation;
-  for (const auto& [cell, a] : f) {
-    const auto other = r.find(cell);
-    if (other == r.end() || a.count < kLeastSamples || other->second.count < kLeastSamples) continue;
-    const Mean& b = other->second;
-    if (std::fabs(a.load / a.count - b.load / b.count) > kLopsided * width) continue;
-    place.push_back(0.5 * (a.load / a.count + b.load / b.count));
-    separation.push_back(a.difference / a.count - b.difference / b.count);
-  }
-  Cells cells;
-  cells.place = vector_of(place), cells.value = vector_of(separation);
-  cells.share = VectorXd::Ones(cells.place.size());
-  cells.width = width;
-  cells.turns = double(place.size()) * width / kTurn;
-  return cells;
-}
-
-Cells separate_cells(const GapRun& forward, const GapRun& reverse, double width) {
-  std::vector<double> place, value, share;
-  double least = std::numeric_limits<double>::infinity();
-  for (const GapRun* run : {&forward, &reverse}) {
-    const std::size_t before = place.size();
-    for (const auto& [cell, m] : means_of(*run, width)) {
-      if (m.count < kLeastSamples) continue;
-      place.push_back(m.load / m.count);
-      value.push_back(m.difference / m.count);
-      share.push_back(run == &forward ? 0.5 : -0.5);
-    }
-    least = std::min(least, double(place.size() - before) * width / kTurn);
-  }
-  return {vector_of(place), vector_of(value), vector_of(share), true, width, least};
-}
-
-/// What a mean over a cell leaves of a wave.
-double of_cell(double order, double width) {
-  const double half = 0.5 * order * width;
-  return half > 0 ? std::sin(half) / half : 1;
-}
-
-/// Columns of one wave: of the gap, and of the centre line where that does not cancel; sine and cosine.
-Index columns_per_wave(const Cells& cells) {
-  return cells.apart ? 4 : 2;
-}
-
-void put_wave(const Cells& cells, double order, MatrixXd& a, Index column) {
-  const double shown = of_cell(order, cells.width);
-  const Eigen::ArrayXd sine = shown * (order * cells.place.array()).sin(),
-                       cosine = shown * (order * cells.place.array()).cos();
-  a.col(column) = cells.share.array() * sine;
-  a.col(column + 1) = cells.share.array() * cosine;
-  if (!cells.apart) return;
-  a.col(column + 2) = sine;
-  a.col(column + 3) = cosine;
-}
 
 int whole_orders(const GapWaveSettings& settings) {
   return int(std::ceil(settings.highest_order));
@@ -136,23 +47,7 @@ struct Trial {
   double chance = 1;
 };
 
-/// Without the waves: mean and whole orders; of runs apart with the scale of the motor, each for itself.
-MatrixXd base_columns(const Cells& cells, int whole) {
-  const Index n = cells.place.size(), per_run = cells.apart ? 2 + 2 * whole : 1 + 2 * whole;
-  MatrixXd a = MatrixXd::Zero(n, cells.apart ? 2 * per_run : per_run);
-  for (Index i = 0; i < n; ++i) {
-    Index c = cells.share[i] > 0 ? 0 : per_run;
-    a(i, c++) = 1;
-    for (int order = 1; order <= whole; ++order) {
-      a(i, c++) = std::sin(order * cells.place[i]);
-      a(i, c++) = std::cos(order * cells.place[i]);
-    }
-    if (cells.apart) a(i, c) = cells.place[i];
-  }
-  return a;
-}
-
-MatrixXd columns(const Cells& cells, const MatrixXd& base, const std::vector<Trial>& waves) {
+MatrixXd columns(const GapCells& cells, const MatrixXd& base, const std::vector<Trial>& waves) {
   const Index per = columns_per_wave(cells);
   MatrixXd a(base.rows(), base.cols() + per * Index(waves.size()));
   a.leftCols(base.cols()) = base;
@@ -161,16 +56,16 @@ MatrixXd columns(const Cells& cells, const MatrixXd& base, const std::vector<Tri
   return a;
 }
 
-/// P(F > f); 1 where there is nothing to tell it by.
+/// P(F > f); 1 where there is too little to judge by.
 double f_tail(double f, double of_wave, double freedom) {
   if (!(f > 0) || !(freedom > 2)) return 1;
   return cdf(complement(boost::math::fisher_f(of_wave, freedom), std::min(f, 1e100)));
 }
 
 /// What is left of the values beside some columns, and by how much less a further order leaves.
-class Left {
+class RestBeside {
  public:
-  Left(const Cells& cells, const MatrixXd& a) : cells_(cells) {
+  RestBeside(const GapCells& cells, const MatrixXd& a) : cells_(cells) {
     q_ = signal::orthonormal_basis(a);
     left_ = beside(cells.value);
     correlation_ = signal::correlation_length({left_.begin(), left_.end()});
@@ -201,7 +96,7 @@ class Left {
   Matrix beside(const Matrix& m) const {
     return m - q_ * (q_.transpose() * m);
   }
-  const Cells& cells_;
+  const GapCells& cells_;
   MatrixXd q_;
   VectorXd left_;
   double correlation_ = 1;
@@ -228,48 +123,48 @@ std::vector<Trial> orders_of(const rig_file::Drive* drive, double highest) {
 
 class Search {
  public:
-  Search(const Cells& cells, const GapWaveSettings& settings)
+  Search(const GapCells& cells, const GapWaveSettings& settings)
       : cells_(cells),
         turns_(cells.turns),
         settings_(settings),
         base_(base_columns(cells, whole_orders(settings))),
         per_(columns_per_wave(cells)),
-        told_(orders_of(settings.drive, settings.highest_order)) {}
+        declared_(orders_of(settings.drive, settings.highest_order)) {}
 
   /// Orders that the two runs do not show alike.
   const std::vector<double>& doubtful() const { return doubtful_; }
 
   std::vector<GapWave> run() {
-    while (waves_.size() < kMostWaves && (add(told()) || add(free()))) {
+    while (waves_.size() < kMostWaves && (add(declared()) || add(free()))) {
     }
     return found();
   }
 
  private:
-  Left left(const std::vector<Trial>& waves) const { return {cells_, columns(cells_, base_, waves)}; }
+  RestBeside left(const std::vector<Trial>& waves) const { return {cells_, columns(cells_, base_, waves)}; }
 
-  /// By a wave that the runs cannot tell from this order.
+  /// By a wave that the runs cannot distinguish from this order.
   bool taken(double order) const {
     return std::any_of(waves_.begin(), waves_.end(),
                        [&](const Trial& w) { return std::fabs(w.order - order) < 0.5 / turns_; });
   }
 
   /// The best of the drive's orders that are left.
-  std::optional<Trial> told() const {
-    const Left rest = left(waves_);
+  std::optional<Trial> declared() const {
+    const RestBeside rest = left(waves_);
     std::optional<Trial> best;
     double most = 0;
-    for (const Trial& t : told_) {
+    for (const Trial& t : declared_) {
       const double gain = taken(t.order) ? 0 : rest.gain(t.order);
       if (gain > most) most = gain, best = t;
     }
-    if (best) best->chance = rest.chance(most, double(told_.size()));
+    if (best) best->chance = rest.chance(most, double(declared_.size()));
     return best;
   }
 
   /// The best of all orders, whole ones of the load left out.
   std::optional<Trial> free() const {
-    const Left rest = left(waves_);
+    const RestBeside rest = left(waves_);
     const double step = 1 / (kPerLine * turns_);
     double best = 0, most = 0;
     for (double order = 1; order <= settings_.highest_order; order += step) {
@@ -288,7 +183,7 @@ class Search {
     if (!trial || trial->chance > settings_.false_alarm) return false;
     waves_.push_back(*trial);
     try {
-      if (!trial->free) doubt_told();
+      if (!trial->free) doubt_declared();
       const signal::Measured order = found_in(fitted(), waves_.size() - 1).order;
       // A free order that may be a whole one is the load's: the map over its turn has it.
       const double off = std::fabs(order.value - std::round(order.value));
@@ -300,17 +195,18 @@ class Search {
   }
 
   /// Whether the record says that the last wave, of the drive, has another order: then that, without a name.
-  void doubt_told() {
-    const Trial told = waves_.back();
+  void doubt_declared() {
+    const Trial named = waves_.back();
     waves_.back().free = true;
     const signal::Measured order = found_in(fitted(), waves_.size() - 1).order;
-    if (!(std::fabs(order.value - told.order) > std::max(kSame * order.standard_error, kScale * told.order)))
-      waves_.back() = told;
+    if (!(std::fabs(order.value - named.order) >
+          std::max(kSame * order.standard_error, kScale * named.order)))
+      waves_.back() = named;
     else
       waves_.back().pinion = waves_.back().load = 0;
   }
 
-  /// Of what the wave has in the values, with its columns in `a` and their sizes.
+  /// Derivative of the values over the order of the wave, from its columns in `a` and their sizes.
   VectorXd slope_over_order(const MatrixXd& a, const VectorXd& size, std::size_t wave) const {
     Eigen::ArrayXd slope = Eigen::ArrayXd::Zero(a.rows());
     for (Index c = base_.cols() + per_ * Index(wave), end = c + per_; c < end; c += 2)
@@ -399,17 +295,17 @@ class Search {
     return all;
   }
 
-  const Cells& cells_;
+  const GapCells& cells_;
   double turns_;
   GapWaveSettings settings_;
   MatrixXd base_;
   Index per_;
-  std::vector<Trial> told_, waves_;
+  std::vector<Trial> declared_, waves_;
   double correlation_ = 1;  // of the last fit
   std::vector<double> doubtful_;
 };
 
-/// Of the load, until the same teeth of the last stage meet again; 0: not told.
+/// Of the load, until the same teeth of the last stage meet again; 0: not declared.
 double turns_to_meet(const rig_file::Drive* drive) {
   if (!drive || drive->stages.empty()) return 0;
   const rig_file::Drive::Stage& last = drive->stages.back();
@@ -432,12 +328,12 @@ GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapW
   GapWaves result;
   result.turns_to_meet = turns_to_meet(settings.drive);
   const double width = kTurn / (kCellsPerWave * settings.highest_order);
-  Cells cells = shared_cells(forward, reverse, width);
+  GapCells cells = shared_cells(forward, reverse, width);
   if (cells.turns < kLeastTurns) cells = separate_cells(forward, reverse, width);
   result.turns = cells.turns;
-  const bool told = result.turns_to_meet > 0;
+  const bool pinion = result.turns_to_meet > 0;
   if (result.turns < kLeastTurns) {
-    if (told)
+    if (pinion)
       result.warnings.push_back(fmt::format(
           "the runs cover {:.3g} turns of the load: what of the gap turns with the pinion needs more "
           "than {:.3g}",
@@ -449,9 +345,9 @@ GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapW
   for (const double order : search.doubtful())
     result.warnings.push_back(fmt::format(
         "order {:.4g} turns with another part than the load; whether with the gap or the centre line "
-        "alone the runs cannot tell, as they share no place",
+        "alone is unknown, as the runs share no place",
         order));
-  if (told && result.turns_to_meet > result.turns + 0.05)
+  if (pinion && result.turns_to_meet > result.turns + 0.05)
     result.warnings.push_back(fmt::format(
         "the same teeth meet again after {:.4g} turns of the load, the runs share {:.3g}: the map "
         "over both gears holds there, beyond it as a series",

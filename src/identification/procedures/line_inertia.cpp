@@ -182,7 +182,7 @@ void require_one_way(const record::Record& record, const Sine& speed) {
                     record.name, speed.mean, std::abs(speed.amplitude)));
 }
 
-/// The motion of all that turns, as if it were the motor's: mean of motor and load, weighted with their
+/// The motion of everything that turns as one: mean of motor and load, weighted with their
 /// inertias.
 record::Record weighted(record::Record record, double motor_share) {
   const std::pair<record::Channel, record::Channel> pairs[] = {

@@ -24,16 +24,17 @@ namespace {
 
 constexpr int kGrid = 12;               // choice (time): places that either edge is tried at first
 constexpr double kLeastOnFlank = 0.03;  // choice: of the rows, beyond either edge
-constexpr double kHold = 0.5;        // theory: samples, between a torque that is held and one of the moment
-constexpr double kReach = 0.5;       // theory: standard deviations of what is known within a bound, 95 %
-constexpr int kStates = 8;           // choice: places of position and of speed, each way
-constexpr int kParts = 16;           // choice: of a record, foretold by the others
-constexpr int kDraws = 100;          // choice (time)
-constexpr double kClear = 4;         // choice: standard deviations of white noise
-constexpr int kRounds = 5;           // choice: of what the terms make of the fitted mesh
-constexpr long kSpareBlocks = 4;     // choice: beyond the unknowns, for a covariance from blocks
-constexpr double kVagueOffset = 1;   // choice: of the torque's spread; only a preloaded mesh feels it
-constexpr double kTold = 2;          // choice: standard errors of the stiffness, from which there are flanks
+constexpr double kHold = 0.5;       // theory: samples, between a torque that is held and one of the moment
+constexpr double kReach = 0.5;      // theory: standard deviations of what is known within a bound, 95 %
+constexpr int kStates = 8;          // choice: places of position and of speed, each way
+constexpr int kParts = 16;          // choice: of a record, predicted by the others
+constexpr int kDraws = 100;         // choice (time)
+constexpr double kClear = 4;        // choice: standard deviations of white noise
+constexpr int kRounds = 5;          // choice: of what the terms make of the fitted mesh
+constexpr long kSpareBlocks = 4;    // choice: beyond the unknowns, for a covariance from blocks
+constexpr double kVagueOffset = 1;  // choice: of the torque's spread; only a preloaded mesh feels it
+constexpr double kClearStiffness =
+    2;                               // choice: standard errors of the stiffness, from which there are flanks
 constexpr double kMostLeft = 0.5;    // choice: relative error, beyond which the model says too little
 constexpr double kFewestPasses = 3;  // theory: in a single one to and fro a drift looks like play
 
@@ -47,7 +48,7 @@ double spread(const Eigen::VectorXd& values) {
   return rms(values.array() - values.mean());
 }
 
-/// Differences over more than a step of the encoder, which hides what less changes.
+/// Differences over more than a step of the encoder, which hides smaller changes.
 signal::NonlinearOptions wide_steps() {
   signal::NonlinearOptions options;
   options.step = 0.02;
@@ -71,7 +72,7 @@ class Fit {
 
   void start();
   void refine();
-  /// Torque anew with what the terms make of the mesh as it is fitted.
+  /// The torque anew, with the terms acting on the fitted mesh.
   void take_torque(const LockedMesh& mesh) {
     whole_torque_ = signals_.torque(rig_, mesh);
     torque_ = signals_.picked(whole_torque_);
@@ -87,10 +88,10 @@ class Fit {
   Eigen::VectorXd residuals() const { return sigma_ * fit_.residuals.head(torque_.size()); }
   Eigen::VectorXd torque() const { return torque_; }
   double share_beyond(bool plus) const;
-  /// Before what the model may lack is counted.
+  /// Before the effects that the model may lack are counted.
   const signal::Measured& known_stiffness() const { return known_stiffness_; }
   const std::vector<std::string>& lacking() const { return lacking_; }
-  /// Then dry friction turns within a sample, and its mean is less than it is.
+  /// Then dry friction changes its sign within a sample, and its mean is too small.
   bool chatters() const { return signals_.chatters(model::GearTrain(rig_).motor_inertia()); }
 
  private:
@@ -135,7 +136,7 @@ Eigen::VectorXd Fit::rows(const Eigen::VectorXd& p) const {
   return out;
 }
 
-/// With these edges everything else is linear: keeps what leaves least. `linear` columns count: without the
+/// With these edges everything else is linear: keeps the best. `linear` columns count: without the
 /// last there is no offset.
 void Fit::consider(const Eigen::VectorXd& teeth, double plus, double minus, Eigen::Index linear,
                    Start& best) {
@@ -155,7 +156,7 @@ void Fit::consider(const Eigen::VectorXd& teeth, double plus, double minus, Eige
 }
 
 /// The best of a grid of edges, and of small gaps without an offset, whose place a preloaded mesh hardly
-/// tells.
+/// shows.
 void Fit::start() {
   const double stiffness = declared_stiffness(), step = travel_.size() / kGrid;
   take_torque({stiffness, travel_.high, travel_.low, 0});
@@ -257,8 +258,8 @@ void Fit::add_timing(const Eigen::MatrixXd& white) {
   fit_.covariance += shift * shift.transpose();
 }
 
-/// Noise of speed and acceleration lessens what they make of the torque, and where the torque answers to the
-/// measured position, as in a closed loop, goes with what is left of it.
+/// Noise of speed and acceleration makes their share of the torque smaller, and where the torque answers to
+/// the measured position, as in a closed loop, goes with what is left of it.
 void Fit::add_noise_of_motion(const Eigen::MatrixXd& white) {
   const auto [acceleration, speed] = signals_.noise_of_motion();
   const double left = signals_.answer() * rms(residuals()), rows = double(torque_.size());
@@ -286,7 +287,7 @@ void Fit::add_lacks() {
     try {
       wider = signal::fit_nonlinear(f, start, scale, options);
     } catch (const CannotIdentify&) {
-      continue;  // the record does not tell the two apart
+      continue;  // the record does not distinguish the two
     }
     const signal::Measured strength = wider.parameter(kUnknowns);
     if (!(std::fabs(strength.value) > kClear * strength.standard_error)) continue;
@@ -301,7 +302,7 @@ void Fit::add_lacks() {
 double Fit::systematic(double floor) const {
   const Eigen::VectorXd left = residuals();
   const double size = rms(left);
-  if (size > kMisfit * floor) return std::sqrt(size * size - floor * floor);
+  if (size > kShowsMissingEffect * floor) return std::sqrt(size * size - floor * floor);
   const Eigen::MatrixXd features = signals_.states(kStates);
   std::vector<int> block;
   for (Eigen::Index i = 0; i < left.size(); ++i) block.push_back(int(i * kParts / left.size()));
@@ -323,7 +324,7 @@ signal::Measured with_error(double value, double variance) {
   return {value, std::sqrt(variance)};
 }
 
-/// What terms are counted with; flanks that overlap count as no gap.
+/// The mesh that the terms act on; flanks that overlap count as no gap.
 model::Rig as_fitted(model::Rig rig, const Eigen::VectorXd& p) {
   const LockedMesh mesh = mesh_of(p);
   model::ContactSpec spec = rig.mesh.contact_spec();
@@ -391,9 +392,9 @@ LockedOutput identify_locked_output(const record::Record& record, const model::R
   if (fit.chatters())
     out.warnings.push_back(record.name +
                            ": the torque jumps from sample to sample and the motor with it: dry friction is "
-                           "shaken off, and friction can hardly be told");
+                           "shaken off, and friction can hardly be estimated");
   const signal::Measured& stiffness = fit.known_stiffness();
-  if (!(stiffness.value > kTold * stiffness.standard_error) || out.relative_error > kMostLeft)
+  if (!(stiffness.value > kClearStiffness * stiffness.standard_error) || out.relative_error > kMostLeft)
     throw CannotIdentify(
         fmt::format("{}: torque hardly follows the position: stiffness {:.3g} +- {:.2g}, {:.3g} % of the "
                     "torque unexplained",

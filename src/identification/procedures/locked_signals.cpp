@@ -27,7 +27,7 @@ constexpr double kTurns = 0.5;           // choice: of the usual speed, that a s
 constexpr std::size_t kFewestRows = 64;  // choice
 constexpr std::size_t kFewestSamples = 64;  // theory: for the noise of a position (bandwidth.h)
 
-/// The rig without what the columns and the mesh do not say.
+/// The rig without what columns and mesh already contain.
 model::Rig plain(model::Rig rig) {
   rig.terms.clear();
   rig.motor.viscous_asymmetry = 0;

@@ -20,7 +20,7 @@ struct LockedMesh {
   double centre() const { return 0.5 * (plus + minus); }
 };
 
-/// What a machine like this often has beside it.
+/// Effects that a machine like this often has beside those declared.
 enum class Lack { load_friction, hardening, slow_friction, delay };
 constexpr Lack kLacks[] = {Lack::load_friction, Lack::hardening, Lack::slow_friction, Lack::delay};
 std::string lack_name(Lack lack);
@@ -55,18 +55,18 @@ class LockedSignals {
   /// torque and steps of the position go together, and the torque is enough to turn a motor of this inertia
   /// round.
   bool chatters(double inertia) const;
-  /// What one sample's delay of the torque adds to it.
+  /// What a delay of one sample adds to the torque.
   Eigen::VectorXd delayed_by_sample() const;
   /// N m, of the contact law of `rig` with these values.
   Eigen::VectorXd mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const;
-  /// In a unit of its own.
+  /// In the effect's own unit.
   Eigen::VectorXd lack(Lack lack, const model::Rig& rig, const LockedMesh& mesh) const;
 
   Eigen::VectorXd picked(const Eigen::VectorXd& values) const;
   Eigen::MatrixXd picked(const Eigen::MatrixXd& values) const;
 
  private:
-  /// Samples over which the speed is smooth (servo_data.h): before and after a stop it tells no direction.
+  /// Samples over which the speed is smooth (servo_data.h): before and after a stop it shows no direction.
   long reach() const;
   std::vector<double> raw_mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const;
   Eigen::VectorXd low_passed(std::vector<double> values) const;

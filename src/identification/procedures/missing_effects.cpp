@@ -9,7 +9,8 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kTold = 0.1;         // choice: share of the squares that are left, that an effect explains
+constexpr double kLeastExplained =
+    0.1;                              // choice: share of the squares that are left, that an effect explains
 constexpr double kComparable = 2;     // choice: times the squares that the best effect leaves
 constexpr int kMostEffects = 4;       // choice: in one machine
 constexpr double kDrawn = 0.1;        // simulation: share of what is left that follows a column
@@ -51,7 +52,7 @@ Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return both;
 }
 
-/// How far x is moved by what none of the effects explains.
+/// How far x is moved by what no effect explains.
 Eigen::VectorXd unexplained(const Eigen::MatrixXd& a, double left) {
   const Eigen::MatrixXd gain = signal::symmetric_inverse(signal::gram(a));
   Eigen::VectorXd drawn(a.cols());
@@ -108,7 +109,7 @@ Eigen::VectorXd drawn_by_missing(const Eigen::MatrixXd& a, const Eigen::VectorXd
       tried.push_back(extended(a, beside(chosen, effect), residuals));
     const auto best = std::min_element(tried.begin(), tried.end(),
                                        [](const Extended& x, const Extended& y) { return x.left < y.left; });
-    if (best == tried.end() || with.left - best->left < kTold * with.left) break;
+    if (best == tried.end() || with.left - best->left < kLeastExplained * with.left) break;
     Eigen::VectorXd furthest = Eigen::VectorXd::Zero(a.cols());
     for (const Extended& e : tried)
       if (e.left <= kComparable * best->left)

@@ -18,10 +18,10 @@ std::vector<EffectShapes> likely_effects(const std::vector<double>& time, const 
                                          const std::vector<double>& speed, const std::vector<double>& torque);
 
 /// Of a fit A x = b with these residuals: how far each x may be from the machine's. Effects are added one
-/// after the other, the most telling first, as long as one explains a tenth of the squares that are left. How
-/// far each moves x counts by the share that it explains, the furthest of those that leave at most twice what
-/// the best leaves; the steps add up. What none explains may follow A by a tenth. `noise`: norm of the
-/// residuals of a machine that lacks nothing. Each effect has as many rows as A.
+/// after the other, the one that explains most first, as long as one explains a tenth of the squares that are
+/// left. How far each moves x counts by the share that it explains, the furthest of those that leave at most
+/// twice what the best leaves; the steps add up. What none explains may follow A by a tenth. `noise`: norm of
+/// the residuals of a machine that lacks nothing. Each effect has as many rows as A.
 Eigen::VectorXd drawn_by_missing(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
                                  const std::vector<Eigen::MatrixXd>& effects, double noise);
 

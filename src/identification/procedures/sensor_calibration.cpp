@@ -125,7 +125,8 @@ SpeedCalibration calibrate_speed(const record::Record& record, const Calibration
   const double largest = std::max(std::fabs(e.least), std::fabs(e.most));
   if (e.most - e.least < kLeastSpread * largest)
     throw CannotIdentify(
-        fmt::format("{}: speeds from {:.3g} to {:.3g} rad/s only: scale and offset cannot be told apart",
+        fmt::format("{}: speeds from {:.3g} to {:.3g} rad/s only: scale and offset cannot be distinguished: "
+                    "run at further speeds",
                     record.name, e.least, e.most));
   const signal::LeastSquaresFit fit = solve(e);
   return {fit.parameter(0), combination(fit, Eigen::Vector2d(-e.centre, 1)),

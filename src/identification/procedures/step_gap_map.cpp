@@ -51,7 +51,7 @@ ProcedureReport run_gap_map(IdentificationCase& c) {
       try {
         GapMap map = identify_gap_map(a.record->record, b.record->record, settings);
         if (c.result.gap_map && c.result.gap_map->mean_gap.standard_error <= map.mean_gap.standard_error)
-          continue;  // the pair that tells more
+          continue;  // the pair that determines it better
         c.result.gap_map = std::move(map);
         report.records = {a.record->record.name, b.record->record.name};
       } catch (const CannotIdentify& error) {

@@ -18,10 +18,10 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kTold = 2;       // choice: standard errors, from which a value is told
-constexpr double kAgree = 0.01;   // choice: chance below which records contradict each other
-constexpr double kGearAbove = 5;  // choice: times the band of the fit: then its inertia counts 4 %
-constexpr double kLinear = 1e-6;  // theory: relative, of a law whose force doubles with the depth
+constexpr double kClearErrors = 2;  // choice: standard errors, from which a value is reported
+constexpr double kAgree = 0.01;     // choice: chance below which records contradict each other
+constexpr double kGearAbove = 5;    // choice: times the band of the fit: then its inertia counts 4 %
+constexpr double kLinear = 1e-6;    // theory: relative, of a law whose force doubles with the depth
 
 /// The same machine with the coupling taken for a part of the teeth. The stiffness of both is fitted; each
 /// damps its share of the motion, as the file has it.
@@ -45,13 +45,13 @@ struct Quantity {
   Member at;
   bool common;  // of all records; else of each
 };
-const char* const kOffset = "offset";  // of a record: the rig file has no place for it
+const char* const kOffsetName = "offset";  // of a record: the rig file has no place for it
 const Quantity kQuantities[] = {{"motor_inertia", &LockedOutput::inertia, true},
                                 {"motor_viscous", &LockedOutput::viscous, true},
                                 {"motor_coulomb", &LockedOutput::coulomb, true},
                                 {"mesh_stiffness", &LockedOutput::stiffness, true},
                                 {"backlash_angle", &LockedOutput::backlash_angle, true},
-                                {kOffset, &LockedOutput::offset, false}};
+                                {kOffsetName, &LockedOutput::offset, false}};
 
 /// Mean by the errors, which grow where the records contradict each other.
 signal::Measured combined(const std::vector<LockedOutput>& found, const Quantity& q,
@@ -68,11 +68,11 @@ signal::Measured less_coupling(const signal::Measured& sum, const model::Rig& ri
   if (rig.output_coupling.rigid) return sum;
   const double square = rig.mesh.lever() * rig.mesh.lever(),
                coupling = rig.output_coupling.stiffness / square;
-  if (!(sum.value + kTold * sum.standard_error < coupling))
+  if (!(sum.value + kClearErrors * sum.standard_error < coupling))
     throw CannotIdentify(
         fmt::format("teeth and output coupling together are {:.4g} +- {:.2g} N m/rad stiff, the coupling "
                     "alone is declared "
-                    "with {:.4g}: what the teeth have of it cannot be told",
+                    "with {:.4g}: what the teeth have of it is unknown",
                     sum.value * square, sum.standard_error * square, rig.output_coupling.stiffness));
   const double teeth = 1 / (1 / sum.value - 1 / coupling);
   return {teeth, sum.standard_error * std::pow(teeth / sum.value, 2)};
@@ -80,7 +80,7 @@ signal::Measured less_coupling(const signal::Measured& sum, const model::Rig& ri
 
 /// Whether a value that may be 0 is less than what the file says of it, with what that is uncertain by.
 bool is_small(const signal::Measured& m, double declared) {
-  return kTold * m.standard_error < kDeclaredUncertainty * declared;
+  return kClearErrors * m.standard_error < kDeclaredUncertainty * declared;
 }
 
 /// The table's units are those of a mesh without base radius.
@@ -94,12 +94,13 @@ std::string unit_of(const rig_file::RigParameter& p, const model::Rig& rig) {
 }
 
 void take(IdentificationCase& c, const std::string& name, signal::Measured m,
-          std::vector<std::string>& untold) {
+          std::vector<std::string>& undetermined) {
   const rig_file::RigParameter& p = rig_file::servo_parameter(name);
-  const bool clear = m.value > kTold * m.standard_error, gap = p.kind == rig_file::ParameterKind::backlash,
+  const bool clear = m.value > kClearErrors * m.standard_error,
+             gap = p.kind == rig_file::ParameterKind::backlash,
              friction = p.is_friction();  // may be 0, unlike an inertia or a stiffness
   if (!clear && !gap && !(friction && is_small(m, p.get(c.declared)))) {
-    untold.push_back(name);
+    undetermined.push_back(name);
     return;
   }
   m.value = std::max(0.0, m.value);
@@ -130,7 +131,7 @@ void require_locked_output(const model::Rig& rig) {
   if (!contact.values.has("stiffness"))
     refuse("identify needs a contact law with stiffness, not '" + contact.law + "'");
   if (rig.mesh.variation || rig.mesh.pairs)
-    refuse("stiffness_variation and tooth_pairs cannot be told from one mean stiffness");
+    refuse("stiffness_variation and tooth_pairs cannot be distinguished from one mean stiffness");
   const bool touches = rig.mesh.contact->needs_impact_speed();
   if (!rig.terms.empty() && (touches || !rig.output_coupling.rigid))
     refuse(
@@ -153,25 +154,25 @@ ProcedureReport run_locked_output(IdentificationCase& c) {
     c.result.warnings.insert(c.result.warnings.end(), one.warnings.begin(), one.warnings.end());
     found.push_back(std::move(one));
   });
-  std::vector<std::string> contradicted, untold;
+  std::vector<std::string> contradicted, undetermined;
   double error = 0, floor = 0;
   for (const LockedOutput& f : found) {
     error += f.relative_error * f.relative_error / double(found.size());
     floor += f.floor * f.floor / double(found.size());
   }
   c.result.channels["torque"] = {std::sqrt(error), std::sqrt(floor)};
-  std::map<std::string, signal::Measured> values;  // all of them, or none where one cannot be told
+  std::map<std::string, signal::Measured> values;  // all of them, or none where one is not determined
   for (const Quantity& q : kQuantities) {
     signal::Measured& m = values[q.name] = combined(found, q, contradicted);
     if (q.at == &LockedOutput::inertia) m.value -= model::GearTrain(rig).motor_inertia() - rig.motor.inertia;
     if (q.at == &LockedOutput::stiffness) m = less_coupling(m, c.declared);
   }
   for (const auto& [name, value] : values)
-    if (name != kOffset) take(c, name, value, untold);
-  c.result.parameters[kOffset] = values.at(kOffset);
-  c.result.units[kOffset] = model::axis_unit("N m", c.declared.linear);
-  if (!untold.empty())
-    c.result.warnings.push_back("the records do not tell " + joined(untold) +
+    if (name != kOffsetName) take(c, name, value, undetermined);
+  c.result.parameters[kOffsetName] = values.at(kOffsetName);
+  c.result.units[kOffsetName] = model::axis_unit("N m", c.declared.linear);
+  if (!undetermined.empty())
+    c.result.warnings.push_back("the records do not determine " + joined(undetermined) +
                                 ": what the rig file says of it is kept");
   if (!contradicted.empty())
     c.result.warnings.push_back("the records contradict each other in " + joined(contradicted) +

@@ -72,7 +72,7 @@ void require_possible(const OneInertia& found, const record::Record& measured) {
   };
   if (found.inertia.value <= 0) refuse("inertia", found.inertia);
   // A friction that is nearly nothing may come out below zero by noise, or by what its error holds.
-  const double by_noise = found.relative_error <= kMisfit * found.floor ? kByNoise : kByMissing;
+  const double by_noise = found.relative_error <= kShowsMissingEffect * found.floor ? kByNoise : kByMissing;
   const signal::Measured least = {found.coulomb.value - std::fabs(found.offset.value),
                                   std::hypot(found.coulomb.standard_error, found.offset.standard_error)};
   const bool drives = least.value + found.viscous.value * fastest(measured, found.cutoff) < 0;
@@ -105,8 +105,8 @@ std::optional<std::pair<double, double>> declared_weight(const model::Rig& rig) 
   return weight;
 }
 
-/// A record, and the machine that it tells by itself.
-struct Told {
+/// A record, and the machine that is identified from it alone.
+struct MachineAlone {
   const record::Record* record;
   OneInertia machine;
   const std::vector<bool>* lost;
@@ -118,9 +118,9 @@ void add_weight(OneInertia& machine, const std::pair<double, double>& declared) 
   machine.gravity_cosine.value += declared.second;
 }
 
-/// All records that tell one; what is left out is a warning. Throws CannotIdentify where none does.
-std::vector<Told> told_by_each(IdentificationCase& c) {
-  std::vector<Told> all;
+/// All records that identify one; what is left out is a warning. Throws CannotIdentify where none does.
+std::vector<MachineAlone> machines_alone(IdentificationCase& c) {
+  std::vector<MachineAlone> all;
   std::vector<std::string> reasons;
   const auto weight = declared_weight(c.declared);
   for (const CaseRecord& r : c.records) {
@@ -138,7 +138,7 @@ std::vector<Told> told_by_each(IdentificationCase& c) {
   }
   if (all.empty()) throw CannotIdentify(joined(reasons));
   for (const std::string& reason : reasons) c.result.warnings.push_back("not used: " + reason);
-  for (const Told& t : all)
+  for (const MachineAlone& t : all)
     for (const std::string& warning : t.machine.warnings)
       c.result.warnings.push_back(all.size() == 1 ? warning : t.record->name + ": " + warning);
   return all;
@@ -175,9 +175,10 @@ ChannelError error_of(const std::vector<OneInertia>& applied) {
 }
 
 /// Whether each record alone is met, with other values.
-std::optional<SeveralMachines> contradicting(const std::vector<Told>& told, const ChannelError& together) {
+std::optional<SeveralMachines> contradicting(const std::vector<MachineAlone>& machines,
+                                             const ChannelError& together) {
   std::vector<RecordAlone> alone;
-  for (const Told& t : told)
+  for (const MachineAlone& t : machines)
     alone.push_back({t.record->name, parameters_of(t.machine), t.machine.relative_error / t.machine.floor});
   return several_machines(std::move(alone), together.error / together.floor);
 }
@@ -210,12 +211,12 @@ void take_machine(const OneInertia& found, IdentificationCase& c) {
 ProcedureReport run_one_inertia(IdentificationCase& c) {
   ProcedureReport report{"one_inertia", {}, ""};
   take_off_terms(c);
-  const std::vector<Told> told = told_by_each(c);
+  const std::vector<MachineAlone> machines = machines_alone(c);
   const auto weight = declared_weight(c.declared);
   std::vector<OneInertia> alone, together;
-  for (const Told& t : told) alone.push_back(t.machine);
+  for (const MachineAlone& t : machines) alone.push_back(t.machine);
   const OneInertia found = combined(alone);
-  for (const Told& t : told) {
+  for (const MachineAlone& t : machines) {
     OneInertia machine = found;
     machine.cutoff = t.machine.cutoff;
     machine.smoothed = t.machine.smoothed;
@@ -232,7 +233,7 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   if (weight) c.result.units["gravity_amplitude"] = "N m", c.result.units["gravity_phase"] = "rad";
   const ChannelError error = c.result.channels["torque"] = error_of(together);
   c.result.delay = found.delay;
-  c.result.several = contradicting(told, error);
+  c.result.several = contradicting(machines, error);
   if (c.result.several) allow_for_several(*c.result.several, c.result.parameters);
   take_machine(found, c);
   take_weight(found, c);

@@ -20,30 +20,30 @@
 namespace backlash::identification {
 namespace {
 
-// Errors fall with the root of the time, while another motion tells apart what one motion mixes. So the time
+// Errors fall with the root of the time, while another motion separates what one motion mixes. So the time
 // that a fit may take goes in equal parts to the few records in which the teeth change flanks most.
-constexpr double kTellingCutoff = 5;     // Hz, choice: of the deflection, far below any mesh resonance
+constexpr double kVariationCutoff = 5;   // Hz, choice: of the deflection, far below any mesh resonance
 constexpr double kHighestCutoff = 0.2;   // choice: of the sampling rate
 constexpr double kMostSeconds = 60;      // s, choice (time): of all records
 constexpr std::size_t kMostRecords = 3;  // choice (time)
-constexpr double kTellingShare =
-    0.3;  // choice: of the most telling record, from which another is worth its time
+constexpr double kWorthwhileShare =
+    0.3;  // choice: of the record that varies most, from which another is worth its time
 constexpr double kFewestSeconds = 2;  // s, choice: of a record
 
 struct Stretch {
   const CaseRecord* record;
   std::size_t from, to;  // samples
-  double telling;        // rad/s, how much the deflection varies
+  double variation;      // rad/s, how much the deflection varies
 };
 
 /// The stretch of a record, at most so long, whose deflection varies most: the teeth change flanks there.
-Stretch most_telling(const CaseRecord& r, double seconds) {
+Stretch most_varied(const CaseRecord& r, double seconds) {
   const double interval = r.record.sampling_interval();
   const auto &motor = r.record.column(record::Channel::motor_position),
              &load = r.record.column(record::Channel::load_position);
   std::vector<double> deflection(motor.size());
   for (std::size_t k = 0; k < motor.size(); ++k) deflection[k] = motor[k] - load[k];
-  const double cutoff = std::min(kTellingCutoff, kHighestCutoff / interval);
+  const double cutoff = std::min(kVariationCutoff, kHighestCutoff / interval);
   deflection = signal::low_pass(deflection, interval, cutoff);
   std::vector<double> sum(motor.size(), 0);
   for (std::size_t k = 1; k < sum.size(); ++k)
@@ -62,16 +62,17 @@ record::EvenGrid cut(const Stretch& s) {
   return {s.record->record.slice(t[s.from], end), {lost + long(s.from), lost + long(s.to)}};
 }
 
-std::vector<Stretch> telling_stretches(const IdentificationCase& c) {
+std::vector<Stretch> varied_stretches(const IdentificationCase& c) {
   std::vector<Stretch> all;
   for (const CaseRecord& r : c.records)
     if (r.drive() && r.has_load && r.record.time.back() - r.record.time.front() >= kFewestSeconds)
-      all.push_back(most_telling(r, kMostSeconds / double(kMostRecords)));
-  std::sort(all.begin(), all.end(), [](const Stretch& a, const Stretch& b) { return a.telling > b.telling; });
+      all.push_back(most_varied(r, kMostSeconds / double(kMostRecords)));
+  std::sort(all.begin(), all.end(),
+            [](const Stretch& a, const Stretch& b) { return a.variation > b.variation; });
   while (!all.empty() &&
-         (all.size() > kMostRecords || all.back().telling < kTellingShare * all.front().telling))
+         (all.size() > kMostRecords || all.back().variation < kWorthwhileShare * all.front().variation))
     all.pop_back();
-  for (Stretch& s : all) s = most_telling(*s.record, kMostSeconds / double(all.size()));
+  for (Stretch& s : all) s = most_varied(*s.record, kMostSeconds / double(all.size()));
   return all;
 }
 
@@ -96,7 +97,7 @@ double spread(const std::vector<double>& y) {
 }
 
 bool lacks_something(const ChannelError& channel) {
-  return channel.error > kMisfit * channel.floor;
+  return channel.error > kShowsMissingEffect * channel.floor;
 }
 
 /// A missing effect draws a friction or a damping to zero, where a logarithm has no error to speak of: what
@@ -160,7 +161,7 @@ std::optional<OutputError> with_hertzian_fit(const OutputError& fit, const std::
   return std::nullopt;
 }
 
-/// Where teeth of another law leave less, no value is told better than by the difference between the laws.
+/// Where teeth of another law leave less, no value is known better than by the difference between the laws.
 void allow_for_other_teeth(const OutputError& fit, const OutputError& other, Identification& result) {
   for (const auto& [name, value] : other.parameters) {
     if (!rig_file::servo_parameter(name).contact.empty()) continue;
@@ -169,7 +170,7 @@ void allow_for_other_teeth(const OutputError& fit, const OutputError& other, Ide
   }
   std::string warning = fmt::format(
       "Hertzian teeth leave less than linear ones, {:.3g} times the noise instead of {:.3g}: the errors hold "
-      "what either tells, trace_residual says which",
+      "the values of both, trace_residual says which",
       most_left(other), most_left(fit));
   if (const auto play = other.parameters.find("backlash_angle"); play != other.parameters.end())
     warning += fmt::format("; backlash_angle by them {:.4g}", play->second.value);
@@ -186,7 +187,7 @@ double start_in_gap(const model::Rig& rig, double encoder_offset) {
 
 ProcedureReport run_output_error(IdentificationCase& c) {
   ProcedureReport report{"output_error", {}, ""};
-  const std::vector<Stretch> stretches = telling_stretches(c);
+  const std::vector<Stretch> stretches = varied_stretches(c);
   if (stretches.empty()) throw CannotIdentify("no record in which motor and load move, with both positions");
   std::vector<ServoData> data;
   for (const Stretch& s : stretches) {
@@ -218,7 +219,8 @@ ProcedureReport run_output_error(IdentificationCase& c) {
     c.result.channels.erase("torque");
     c.result.torque.clear();
     c.result.warnings.emplace_back(
-        "other axes move (gear_train.coupled): the torque cannot be told, nor what it tells");
+        "other axes move (gear_train.coupled): the torque is not predicted, and what it would show stays "
+        "unknown");
   }
   const ChannelError d = c.result.channels["deflection"];
   report.message =

@@ -47,7 +47,7 @@ ResponseDetail respond(const record::Record& record) {
       best.alternatives[letter] =
           split_stiffness(known, best.resonances, best.plateaus.total, best.plateaus.motor);
     } catch (const CannotIdentify&) {  // frequencies and inertias that contradict each other: the fit
-                                       // tells more
+                                       // says more
     }
   }
   return best;

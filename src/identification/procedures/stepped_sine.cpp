@@ -14,7 +14,7 @@ namespace backlash::identification {
 namespace {
 
 constexpr std::size_t kFewestCycles = 4, kMostCycles = 200;
-constexpr std::size_t kFewestForNoise = 64;  // theory: samples that tell the noise
+constexpr std::size_t kFewestForNoise = 64;  // theory: samples that show the noise
 constexpr double kBetween = 2.5;             // choice: cycles between two runs that count as inside
 constexpr double kMostMoved = 0.25;      // choice: cycles that a refined passage may lie from the rough one
 constexpr double kTail = 0.01;           // choice: share of the samples beyond the range on either side
@@ -22,7 +22,7 @@ constexpr std::size_t kSettling = 5;     // choice: one of so many cycles is lef
 constexpr std::size_t kSpareTheEnd = 8;  // choice: cycles, from which on the last one is left out too
 constexpr double kLeastUneven = 1e-3, kMostUneven = 0.02;  // choice: cycles
 constexpr double kJitter = 5;                              // choice: deviations of a passage
-constexpr std::size_t kJitterReach = 10;  // choice: passages on either side that tell the deviation
+constexpr std::size_t kJitterReach = 10;  // choice: passages on either side that show the deviation
 constexpr double kSameHeight = 0.2;       // choice: of the amplitude
 constexpr double kNoSine = 0.1;           // choice: of the torque's power
 constexpr double kTurn = 0.1;             // choice: of the torque's range; a smaller turn is noise
@@ -93,8 +93,8 @@ std::vector<Passage> find_passages(const std::vector<double>& u) {
   return passages;
 }
 
-/// How far [cycles] passages near `i` may be off an even step: some deviations, told by third differences,
-/// which neither a sweep nor a step of the frequency now and then has.
+/// How far [cycles] passages near `i` may be off an even step: some deviations, estimated by third
+/// differences, which neither a sweep nor a step of the frequency now and then has.
 double allowance(const std::vector<Passage>& p, std::size_t i) {
   const std::size_t first = i < kJitterReach ? 0 : i - kJitterReach;
   std::vector<double> third;

@@ -109,7 +109,7 @@ Resonances find_resonances(const FrequencyResponse& motor) {
   const Points& points = motor.points;
   if (points.size() < 4 * kBeside)
     throw CannotIdentify("only " + std::to_string(points.size()) +
-                         " points of the response: no resonance can be told");
+                         " points of the response: no resonance can be found: run at more frequencies");
   // w |H| is flat but for friction and the resonances, so its maximum is the resonance; below it |H| falls
   // but for the anti-resonance.
   const auto lifted =

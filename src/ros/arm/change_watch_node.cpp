@@ -167,7 +167,7 @@ void ChangeWatchNode::describe(const JointWatch& joint, Status& status) const {
   else if (!state.different.empty())
     status.summary(DiagnosticStatus::WARN, "differs from the healthy machine by " + joined(state.different) +
                                                " since before " + utc_time(state.from) +
-                                               ": since when cannot be told");
+                                               ": the onset is unknown");
   else
     status.summary(DiagnosticStatus::OK, "as commissioned, up to " + utc_time(state.to) +
                                              (state.unjudged.empty() ? "" : ", but for joints not judged") +
@@ -180,9 +180,9 @@ void ChangeWatchNode::describe(const JointWatch& joint, Status& status) const {
   status.add("Windows of motion judged", state.windows);
   status.add("Joints not judged", joined(state.unjudged));
   status.add("Looks", state.looks);
-  status.add("Looks that could tell", state.judged);
+  status.add("Looks with an answer", state.judged);
   status.add("Looks left out", state.left_out);
-  status.add("Last look", state.why_not.empty() ? "could tell" : state.why_not);
+  status.add("Last look", state.why_not.empty() ? "has an answer" : state.why_not);
   status.add("Samples", state.counters.taken);
   status.add("Samples not a number", state.counters.not_a_number);
   status.add("Stamps repeated", state.counters.repeated);
@@ -191,7 +191,7 @@ void ChangeWatchNode::describe(const JointWatch& joint, Status& status) const {
   status.add("Last jump", state.counters.last_jump);
   status.add("Messages that are wrong", state.bad_messages);
   status.add("Last wrong message", state.last_problem);
-  status.add("Changes told", state.changes.size());
+  status.add("Changes reported", state.changes.size());
   status.add("History", state.log_problem.empty() ? settings.log : state.log_problem);
 }
 

@@ -32,7 +32,7 @@ double false_alarm_rate(const std::string& text) {
 }
 
 const char* change_watch_help() {
-  return R"(change_watch: tells since when joints differ from what they were when they were commissioned
+  return R"(change_watch: finds out whether joints differ from what they were when commissioned, and since when
 
 usage: rosrun backlash_diagnosis change_watch [_PARAMETER:=VALUE ...] [NAME:=REMAPPED ...]
 
@@ -41,7 +41,7 @@ parameters (private)
             link), whose backlash is watched where load_position is among its channels, of a pinion with a
             torque sensor (elastic input_coupling), which needs sensor_torque, or of an arm (urdf), whose
             joints are watched together, and what it carries; or
-  rig_folder  folder with a rig file for each joint of a robot; of others it says that it cannot tell
+  rig_folder  folder with a rig file for each joint of a robot; of others it reports no answer
   joints    list of joint names; default: the joint of the rig file, or all of rig_folder
   channels/CHANNEL/...   topic, name, field, scale, offset: where the robot publishes that channel, as
             `channels` of the rig file, and instead of them
@@ -58,7 +58,7 @@ parameters (private)
             only, default: position and effort of JOINT
   folder    where JOINT_healthy.csv is kept, the record that was learned from: delete it to learn anew;
             default: backlash_diagnosis in ROS_HOME (~/.ros)
-  history   folder, which must exist, for a file JOINT_changes.csv with all that was told; default: none
+  history   folder, which must exist, for a file JOINT_changes.csv with all that was reported; default: none
   queue     messages waiting at most; default 20000
   stale     s of wall time without a message before /diagnostics says so; default 2
   look_share   of one processor's time that looks may take, one after the other; default 1. Where joints are

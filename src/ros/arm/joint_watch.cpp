@@ -54,15 +54,13 @@ record::RingSettings ring_settings(const WatchSettings& settings) {
   return ring;
 }
 
-/// Why no look at such a joint can tell anything; empty: it can.
+/// Why no look at such a joint has an answer; empty: it may have one.
 std::string reason_against(const JointRig& joint) {
   const model::Rig& rig = joint.rig.rig;
   if (!rig.mesh.rigid && !model::has_two_inertias(rig) && !has_sensor(joint))
-    return "changes are told of joints of one inertia (mesh: rigid), of two (rigid couplings, a free link) "
-           "and "
-           "of a pinion with a torque sensor (an elastic input_coupling) that waveform fits, which its rig "
-           "file "
-           "does not declare";
+    return "the rig file declares neither one inertia (mesh: rigid) nor two (rigid couplings, a free link) "
+           "nor "
+           "a pinion with a torque sensor (an elastic input_coupling): changes are found of these only";
   std::vector<record::Channel> needed = {record::Channel::motor_torque, record::Channel::motor_position};
   if (has_sensor(joint)) needed.push_back(record::Channel::sensor_torque);
   for (const record::Channel wanted : needed)
@@ -272,7 +270,7 @@ WatchState JointWatch::state() const {
   state.counters = rings_.front().counters();
   state.healthy = joined(healthy_);
   state.learning = rings_.front().length();
-  state.changes = ledger_.told();
+  state.changes = ledger_.reported();
   state.different = ledger_.unexplained_difference();
   if (!impossible_.empty())
     state.why_not = impossible_;

@@ -60,7 +60,7 @@ void SimulatedArm::step(std::map<std::string, sensor_msgs::JointState>& messages
 
 void SimulatedArm::reset() {
   simulation_.reset();
-  for (JointControls& joint : controls_) joint.tell();
+  for (JointControls& joint : controls_) joint.publish();
 }
 
 bool SimulatedArm::set_rig(backlash_diagnosis::SetRig::Request& request,
@@ -69,7 +69,7 @@ bool SimulatedArm::set_rig(backlash_diagnosis::SetRig::Request& request,
     const geared_arm::GearedArm arm = geared_arm::geared_arm_from_text(request.rig, "set_rig", folder_);
     simulation_.plant().set_machine(arm);
     held_ = arm.rig.held;
-    for (JointControls& joint : controls_) joint.tell();
+    for (JointControls& joint : controls_) joint.publish();
     response.success = true;
     response.message = "the arm is " + arm.rig.name + ", " + std::to_string(arm.rig.payloads.size()) +
                        " payloads; backlash is " + true_backlash();

@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/record/numbers.h"
 #include "backlash_diagnosis/rig_draft/seen_joint.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "backlash_diagnosis/ros/published_names.h"
@@ -58,7 +59,9 @@ double strays(const std::string& path, const FoundJoint& joint, const PublishedN
   map.sources = {joint.channels.sources.front(),
                  source(record::Channel::load_position, name, record::Field::position)};
   try {
-    const rig_draft::SeenJoint seen = rig_draft::look_at_joint({ros_bridge::read_bag(path, map), {}});
+    record::Record record = ros_bridge::read_bag(path, map);
+    record::keep_rows_with_numbers({&record});
+    const rig_draft::SeenJoint seen = rig_draft::look_at_joint({std::move(record), {}});
     if (seen.load) return seen.load->looseness * std::abs(seen.load->motor_turns) / seen.travel;
   } catch (const BadData&) {  // too short, or at rest
   }

@@ -8,7 +8,8 @@ namespace backlash::tools {
 int check_arm(const Arguments& arguments) {
   const arm::ArmRig rig = arm::load_arm_rig(arguments.text("rig"));
   const std::string& path = arguments.positional(0);
-  return report_of(look_at_joints(read_joints(path, rig), path, rig.channel), arguments);
+  return report_of(look_at_joints(read_joints(path, rig), path, rig.channel, arguments.has("plot")),
+                   arguments);
 }
 
 }  // namespace backlash::tools

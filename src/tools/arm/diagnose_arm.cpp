@@ -28,7 +28,7 @@ int diagnose_arm(const Arguments& arguments, RecordDoor& door) {
     if (!out.empty()) write_text(out, json);
     arm_findings::print_arm_plays(report, std::cout);
   }
-  // A fault that was found counts more than a joint that cannot be told.
+  // A fault that was found counts more than a joint without an answer.
   bool unknown = false;
   int worst = kHealthy;
   for (std::size_t j = 0; j < report.verdicts.size(); ++j) {

@@ -25,7 +25,8 @@ double steady_seconds() {
 
 Option feedback_option() {
   return {"feedback", "",
-          "for programs that start this one: tell how far it is as a JSON object a line on standard output, "
+          "for programs that start this one: report how far it is as one JSON object per line on standard "
+          "output, "
           "instead of the summary, and stop on SIGTERM without leaving anything behind"};
 }
 
@@ -34,7 +35,7 @@ FeedbackLines::FeedbackLines() {
 }
 
 Progress FeedbackLines::progress() {
-  return [this](double fraction, const std::string& phase) { return tell(fraction, phase); };
+  return [this](double fraction, const std::string& phase) { return send(fraction, phase); };
 }
 
 BestSoFar FeedbackLines::best_so_far() {
@@ -45,7 +46,7 @@ BestSoFar FeedbackLines::best_so_far() {
   };
 }
 
-bool FeedbackLines::tell(double fraction, const std::string& phase) {
+bool FeedbackLines::send(double fraction, const std::string& phase) {
   const std::lock_guard<std::mutex> lock(mutex_);
   fraction_ = fraction;
   phase_ = phase;

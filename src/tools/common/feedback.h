@@ -25,7 +25,7 @@ class FeedbackLines {
   BestSoFar best_so_far();
 
  private:
-  bool tell(double fraction, const std::string& phase);
+  bool send(double fraction, const std::string& phase);
   bool write();
 
   std::mutex mutex_;  // both may be called at the same time

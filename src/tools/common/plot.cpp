@@ -25,6 +25,14 @@ void draw(const std::string& name, const std::string& out, const std::string& da
   if (code != kHealthy) throw Error(name + " failed (exit code " + std::to_string(code) + ")" + kept);
 }
 
+/// The same of data that no file keeps.
+void draw_text(const std::string& name, const std::string& out, const std::string& json) {
+  const ScratchFolder scratch;
+  const std::string data = scratch.path("data.json");
+  write_text(data, json);
+  draw(name, out, data, "");
+}
+
 }  // namespace
 
 void check_plot_path(const std::string& path) {
@@ -58,10 +66,11 @@ void plot_separability_map(const std::string& json_path, const std::string& pict
 }
 
 void plot_trend(const std::string& json, const std::string& picture_path) {
-  const ScratchFolder scratch;
-  const std::string data = scratch.path("trend.json");
-  write_text(data, json);
-  draw("plot_trend.py", picture_path, data, "");
+  draw_text("plot_trend.py", picture_path, json);
+}
+
+void plot_check(const std::string& series, const std::string& picture_path) {
+  draw_text("plot_check.py", picture_path, series);
 }
 
 }  // namespace backlash::tools

@@ -31,4 +31,7 @@ void plot_separability_map(const std::string& json_path, const std::string& pict
 /// Draws the JSON of backlash_trend, given as text: its file is optional. Throws as plot_curve.
 void plot_trend(const std::string& json, const std::string& picture_path);
 
+/// Draws what check_record saw (report::record_check_series). Throws as plot_curve.
+void plot_check(const std::string& series, const std::string& picture_path);
+
 }  // namespace backlash::tools

@@ -9,11 +9,12 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/record/numbers.h"
 
 namespace backlash::tools {
 namespace {
 
-constexpr double kWorthwhile = 0.5;  // choice: of the longest stretch; shorter ones tell little beside it
+constexpr double kWorthwhile = 0.5;  // choice: of the longest stretch; shorter ones add little to it
 
 void refuse_if(const report::CheckedFile& file) {
   for (const record::Finding& finding : file.findings())
@@ -54,6 +55,18 @@ record::Stretch longest_of_all(const report::CheckedFile& file) {
   return record::longest_stretch(all);
 }
 
+/// Of joints on one time base the rows that all have; else of each its own.
+void drop_rows_without_numbers(std::vector<record::JointRecord>& joints) {
+  std::vector<record::Record*> all;
+  for (record::JointRecord& joint : joints) {
+    all.push_back(&joint.record);
+    if (joint.record.time != joints.front().record.time) all.clear();
+    if (all.empty()) break;
+  }
+  if (!all.empty()) return record::keep_rows_with_numbers(all);
+  for (record::JointRecord& joint : joints) record::keep_rows_with_numbers({&joint.record});
+}
+
 /// Jumps are what is looked for, and a step of the clock is a rest; a channel that stands still would be a
 /// change of anything.
 void refuse_frozen(const report::CheckedFile& file) {
@@ -84,6 +97,7 @@ report::CheckedFile checked_joints(std::vector<record::JointRecord>& joints, con
     joint.record = std::move(checked.record);
     file.joints.push_back({joint.joint, std::move(checked.check)});
   }
+  drop_rows_without_numbers(joints);
   return file;
 }
 

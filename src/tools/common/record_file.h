@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Records as files whose extension tells the format, and what is checked about files before long work begins.
+// Records as files whose extension gives the format, and what is checked about files before long work begins.
 #pragma once
 
 #include <string>

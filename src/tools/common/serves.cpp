@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/plot.h"
 #include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
@@ -180,16 +181,22 @@ std::vector<Serves> serves_of(const report::CheckedFile& file, const record::Rec
 }
 
 Looked look_at_joints(std::vector<record::JointRecord> joints, const std::string& path,
-                      const std::optional<Channel>& drive) {
+                      const std::optional<Channel>& drive, bool for_plot) {
+  std::vector<record::JointRecord> recorded;
+  if (for_plot) recorded = joints;
   Looked looked{checked_joints(joints, path), {}};
   looked.serves = serves_of(looked.file, joints, drive);
+  looked.recorded = std::move(recorded);
   return looked;
 }
 
 int report_of(const Looked& looked, const Arguments& arguments) {
   if (arguments.has("json"))
     write_text(arguments.text("json"), report::record_check_json(looked.file, looked.serves));
-  std::cout << report::record_check_text(looked.file, looked.serves);
+  std::cout << report::record_check_text(looked.file, looked.serves) << std::flush;
+  if (arguments.has("plot"))
+    plot_check(report::record_check_series(looked.file, looked.recorded, looked.linear),
+               arguments.text("plot"));
   int code = kHealthy;
   for (const record::Finding& finding : looked.file.findings()) {
     if (finding.consequence == record::Consequence::refused) return kInconclusive;

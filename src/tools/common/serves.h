@@ -22,14 +22,16 @@ std::vector<report::Serves> serves_of(const report::CheckedFile& file, const rec
 struct Looked {
   report::CheckedFile file;
   std::vector<report::Serves> serves;
+  std::vector<record::JointRecord> recorded{};  // as it was read, where a plot is asked for
+  bool linear = false;
 };
 
 /// Of an arm: of all joints at once. `drive` is the channel of its drives by the rig file, absent where only
 /// the columns are known.
 Looked look_at_joints(std::vector<record::JointRecord> joints, const std::string& path,
-                      const std::optional<record::Channel>& drive);
+                      const std::optional<record::Channel>& drive, bool for_plot);
 
-/// Prints and writes it, and returns the exit code of check_record. Outputs are checked already.
+/// Prints, writes and draws it, and returns the exit code of check_record. Outputs are checked already.
 int report_of(const Looked& looked, const Arguments& arguments);
 
 }  // namespace backlash::tools

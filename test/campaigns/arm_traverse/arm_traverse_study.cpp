@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How often the play of an arm's joints, told by one encoder per joint, is right, unknown, or wrong: draws
-// arms with play in none, some or all joints, simulates a record of each, takes the links' encoders away,
-// diagnoses with a rig file that does not know what undeclared.h did to the machine, and counts.
+// How often the play of an arm's joints, estimated with one encoder per joint, is right, unknown, or wrong:
+// draws arms with play in none, some or all joints, simulates a record of each, takes the links' encoders
+// away, diagnoses with a rig file that does not know what undeclared.h did to the machine, and counts.
 // Deterministic for its arguments.
 #include <fmt/format.h>
 
@@ -82,7 +82,7 @@ std::vector<JointTraverse> diagnosed(GearedArm machine, const GearedArm& declare
 }
 
 struct Count {
-  int asked = 0, told = 0, within = 0, holds = 0, most = 0, most_holds = 0, wrong_sure = 0;
+  int asked = 0, found = 0, within = 0, holds = 0, most = 0, most_holds = 0, wrong_sure = 0;
   double worst = 0;  // error over the interval's half width
 
   void add(const diagnosis::Estimate& e, double truth) {
@@ -92,7 +92,7 @@ struct Count {
     const double width = e.angle_upper - e.angle_lower;
     wrong_sure += truth < e.angle_lower - 2 * width || truth > e.angle_upper + 2 * width;
     worst = std::fmax(worst, std::fabs(truth - (e.angle_lower + e.angle_upper) / 2) / (width / 2));
-    (e.status == Status::ok ? told : most) += 1;
+    (e.status == Status::ok ? found : most) += 1;
     (e.status == Status::ok ? holds : most_holds) += in;
     within += e.status == Status::ok && std::fabs(e.backlash_angle - truth) <= 0.1 * truth;
   }
@@ -102,21 +102,21 @@ constexpr const char* kRow =
     "{:<14} |{:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} |{:>6} {:>5} {:>6} {:>6} |{:>6.1f} {:>6}\n";
 
 void print(const std::string& name, const Count& play, const Count& sound) {
-  fmt::print(kRow, name, play.asked, play.told, play.within, play.holds, play.most, play.most_holds,
-             play.asked - play.told - play.most, sound.asked, sound.told, sound.most,
-             sound.asked - sound.told - sound.most, std::fmax(play.worst, sound.worst),
+  fmt::print(kRow, name, play.asked, play.found, play.within, play.holds, play.most, play.most_holds,
+             play.asked - play.found - play.most, sound.asked, sound.found, sound.most,
+             sound.asked - sound.found - sound.most, std::fmax(play.worst, sound.worst),
              play.wrong_sure + sound.wrong_sure);
   std::fflush(stdout);
 }
 
 void add(Count& sum, const Count& c) {
-  sum.asked += c.asked, sum.told += c.told, sum.within += c.within, sum.holds += c.holds;
+  sum.asked += c.asked, sum.found += c.found, sum.within += c.within, sum.holds += c.holds;
   sum.most += c.most, sum.most_holds += c.most_holds, sum.wrong_sure += c.wrong_sure;
   sum.worst = std::fmax(sum.worst, c.worst);
 }
 
-Json told(const Options& o, const std::string& kind, int arm, const std::string& joint, double truth,
-          const JointTraverse& t) {
+Json line_of(const Options& o, const std::string& kind, int arm, const std::string& joint, double truth,
+             const JointTraverse& t) {
   const diagnosis::Estimate& e = t.estimate;
   return {{"rig", o.rig},
           {"kind", kind},
@@ -138,7 +138,7 @@ int run(const Options& o) {
   if (!o.out.empty()) out.open(o.out, std::ios::app);
   fmt::print("{:<14} |{:^46} |{:^26} |\n", "", "joints with play", "joints without");
   fmt::print("{:<14} |{:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} |{:>6} {:>5} {:>6} {:>6} |{:>6} {:>6}\n",
-             "undeclared", "asked", "told", "<10 %", "holds", "most", "holds", "unkn.", "asked", "told",
+             "undeclared", "asked", "found", "<10 %", "holds", "most", "holds", "unkn.", "asked", "found",
              "most", "unkn.", "worst", "w+sure");
   const std::vector<std::string>& kinds = undeclared_kinds();
   for (std::size_t k = 0; k < kinds.size(); ++k) {
@@ -155,14 +155,14 @@ int run(const Options& o) {
       for (std::size_t j = 0; j < found.size(); ++j) {
         const double truth = machine.joints[j].gear->backlash;
         (truth > 0 ? play : sound).add(found[j].estimate, truth);
-        if (out) out << told(o, kind, i, declared.rig.joints[j].name, truth, found[j]).dump() << std::endl;
+        if (out) out << line_of(o, kind, i, declared.rig.joints[j].name, truth, found[j]).dump() << std::endl;
       }
     }
     print(kind, play, sound);
     add(all_play, play), add(all_sound, sound);
   }
   print("all", all_play, all_sound);
-  return all_play.wrong_sure + all_sound.wrong_sure + all_sound.told > 0 ? 2 : 0;
+  return all_play.wrong_sure + all_sound.wrong_sure + all_sound.found > 0 ? 2 : 0;
 }
 
 }  // namespace

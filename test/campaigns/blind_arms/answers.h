@@ -25,7 +25,7 @@ std::string record_of(const Options& options, const Arm& arm, const std::string&
 /// As the package's commands read it. Throws as they do.
 backlash::arm::ArmRecord read_record(const std::string& path, const backlash::arm::ArmRig& rig);
 
-/// Reasons why nothing was told, without their figures.
+/// Reasons why nothing was reported, without their figures.
 class Reasons {
  public:
   void add(const std::string& message);

@@ -24,7 +24,7 @@ std::string listed(const std::vector<Kind>& all) {
 
 /// False: help was asked for and given.
 bool read_options(int argc, char** argv, Options& o) {
-  po::options_description options("arm_blind_study: what is told of arms that MuJoCo moves");
+  po::options_description options("arm_blind_study: what is reported of arms that MuJoCo moves");
   auto add = options.add_options();
   add("help", "this text");
   add("ask", po::value(&o.ask)->default_value(o.ask),

@@ -56,7 +56,7 @@ const Added* found(const ArmStep& step, const std::string& effect, const std::ve
   return nullptr;
 }
 
-/// Told to be not told from what was named.
+/// Reported as not distinguished from what was named.
 bool among(const ArmStep& step, const std::vector<Added>& all) {
   return std::any_of(step.equivalent_to.begin(), step.equivalent_to.end(),
                      [&](const std::string& other) { return found(step, other, all) != nullptr; });
@@ -154,7 +154,7 @@ void add(Count& c, const ArmTrace& trace, const std::string& kind, const Arm& ar
                values = of_drive || (truth && step.effect != "friction_drift" &&
                                      step.effect != "gravity_direction" && step.effect != "stribeck");
     if (!good || values)
-      fmt::print("{}: {} {}: {}; true: {}\n", good ? "told" : "wrong", arm.seed, kind, words_of(step),
+      fmt::print("{}: {} {}: {}; true: {}\n", good ? "right" : "wrong", arm.seed, kind, words_of(step),
                  truth_of(arm));
     if (values)
       add_values(c, step.effect == "payload" ? payload_errors(step, arm)

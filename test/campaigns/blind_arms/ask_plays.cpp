@@ -15,7 +15,7 @@ using backlash::diagnosis::Estimate;
 using backlash::diagnosis::Status;
 
 struct Count {
-  int asked = 0, told = 0, within = 0, holds = 0, most = 0, most_holds = 0, wrong_sure = 0;
+  int asked = 0, found = 0, within = 0, holds = 0, most = 0, most_holds = 0, wrong_sure = 0;
 
   void add(const Estimate& e, double truth) {
     ++asked;
@@ -23,21 +23,21 @@ struct Count {
     const bool in = e.angle_lower <= truth && e.angle_upper >= truth;
     const double width = e.angle_upper - e.angle_lower;
     wrong_sure += truth < e.angle_lower - 2 * width || truth > e.angle_upper + 2 * width;
-    (e.status == Status::ok ? told : most) += 1;
+    (e.status == Status::ok ? found : most) += 1;
     (e.status == Status::ok ? holds : most_holds) += in;
     within += e.status == Status::ok && std::fabs(e.backlash_angle - truth) <= 0.1 * truth;
   }
-  int missed() const { return told - holds + most - most_holds; }
+  int missed() const { return found - holds + most - most_holds; }
 };
 
 void add(Count& sum, const Count& c) {
-  sum.asked += c.asked, sum.told += c.told, sum.within += c.within, sum.holds += c.holds;
+  sum.asked += c.asked, sum.found += c.found, sum.within += c.within, sum.holds += c.holds;
   sum.most += c.most, sum.most_holds += c.most_holds, sum.wrong_sure += c.wrong_sure;
 }
 
 void print(const std::string& name, const Count& c) {
-  fmt::print("| {:<9} | {:>5} | {:>4} | {:>6} | {:>5} | {:>7} | {:>5} | {:>11} | {:>14} |\n", name, c.asked,
-             c.told, c.within, c.holds, c.most, c.most_holds, c.asked - c.told - c.most, c.wrong_sure);
+  fmt::print("| {:<9} | {:>5} | {:>5} | {:>6} | {:>5} | {:>7} | {:>5} | {:>11} | {:>14} |\n", name, c.asked,
+             c.found, c.within, c.holds, c.most, c.most_holds, c.asked - c.found - c.most, c.wrong_sure);
 }
 
 /// The answer of the joint: the last estimate is the motor's where there is one encoder.
@@ -49,7 +49,7 @@ void print_missed(const Arm& arm, const std::string& kind, std::size_t joint, co
   const double truth = arm.joints[joint].play;
   if (e.status != Status::ok && e.status != Status::below_range) return;
   if (e.angle_lower <= truth && e.angle_upper >= truth) return;
-  fmt::print("missed: {} {} {}: {:.3f} mrad, told {:.3f} [{:.3f}, {:.3f}], {}\n", arm.seed, kind,
+  fmt::print("missed: {} {} {}: {:.3f} mrad, found {:.3f} [{:.3f}, {:.3f}], {}\n", arm.seed, kind,
              joint_name(joint), 1e3 * truth, 1e3 * e.backlash_angle, 1e3 * e.angle_lower, 1e3 * e.angle_upper,
              e.message);
 }
@@ -92,7 +92,7 @@ int ask_plays(const Options& options) {
     std::fflush(stdout);
   }
   fmt::print(
-      "| kind | asked | told | < 10 % | holds | at most | holds | cannot tell | wrong and sure |\n"
+      "| kind | asked | found | < 10 % | holds | at most | holds | cannot tell | wrong and sure |\n"
       "|---|---|---|---|---|---|---|---|---|\n");
   for (const auto& [kind, count] : counts) print(kind, count), add(all, count);
   print("all", all);

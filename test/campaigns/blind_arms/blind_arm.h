@@ -72,7 +72,7 @@ struct DeclaredJoint {
   double mass = 1, centre = 1, friction = 1, link_friction = 1, rotor = 1, stiffness = 1;
 };
 
-/// What should be told: an effect by the package's name; strength and shape in its units.
+/// What should be reported: an effect by the package's name; strength and shape in its units.
 struct Added {
   std::string effect;
   std::size_t joint = 0;

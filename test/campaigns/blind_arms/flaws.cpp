@@ -29,7 +29,7 @@ double drawn_torque(const Arm& arm, std::size_t joint, Random& random) {
          log_uniform(random, 0.02, 0.2);
 }
 
-/// Puts it on that joint, and writes down what should be told of it.
+/// Puts it on that joint, and writes down what should be reported of it.
 void put(Arm& arm, const std::string& effect, std::size_t joint, Random& random) {
   Joint& j = arm.joints[joint];
   const double torque = drawn_torque(arm, joint, random);

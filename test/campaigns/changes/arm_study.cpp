@@ -17,7 +17,7 @@ using arm::DriveTerm;
 
 constexpr double kLearn = 40, kRecord = 60;  // s
 
-/// What is done to the machine, and what should be told of it.
+/// What is done to the machine, and what should be reported of it.
 struct Truth {
   std::string effect, joint, size;
   double value = 0;
@@ -63,7 +63,7 @@ void count(const changes::Changes& found, const Truth& truth, double since, Coun
   for (const changes::Change& c : found.changes) {
     if (&c == right || c.effect == "unknown") continue;
     right ? ++n.beside : ++n.wrong;
-    fmt::print("told {} of {} at {:.1f} s, gain {:.3g}, alike {}; true: {} of {} at {:.1f} s\n", c.effect,
+    fmt::print("reported {} of {} at {:.1f} s, gain {:.3g}, alike {}; true: {} of {} at {:.1f} s\n", c.effect,
                c.joint, c.since, c.gain, fmt::join(c.alike, ", "), truth.effect, truth.joint, since);
   }
   if (!right) return;
@@ -83,7 +83,7 @@ test::Machine drawn(std::uint64_t seed, bool rough) {
 }
 
 void healthy(int arms, std::uint64_t seed, double rate, bool rough) {
-  int told = 0, cannot = 0;
+  int reported = 0, cannot = 0;
   for (int i = 0; i < arms; ++i) {
     const std::uint64_t s = seed + std::uint64_t(i);
     const test::Machine machine = drawn(s, rough);
@@ -97,15 +97,15 @@ void healthy(int arms, std::uint64_t seed, double rate, bool rough) {
     const auto found = changes::detect_changes(
         machine.declared, {machine.record(10 * s, kLearn), machine.record(10 * s + 1, kLearn)},
         day.record(10 * s + 2, kRecord), settings);
-    told += !found.changes.empty();
+    reported += !found.changes.empty();
     cannot += found.changes.empty() && !found.cannot_tell.empty();
     for (const changes::Change& c : found.changes)
-      fmt::print("told {} of {} at {:.1f} s, gain {:.3g}; true: healthy\n", c.effect, c.joint, c.since,
+      fmt::print("reported {} of {} at {:.1f} s, gain {:.3g}; true: healthy\n", c.effect, c.joint, c.since,
                  c.gain);
     if (!found.cannot_tell.empty()) fmt::print("healthy, {}\n", found.cannot_tell);
   }
-  fmt::print("arms, healthy: {} looks at {} s, {:.3g} false alarms allowed; told {}, cannot tell {}\n", arms,
-             kRecord, rate * kRecord / 3600 * arms, told, cannot);
+  fmt::print("arms, healthy: {} looks at {} s, {:.3g} false alarms allowed; reported {}, cannot tell {}\n",
+             arms, kRecord, rate * kRecord / 3600 * arms, reported, cannot);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How often a healthy arm is called changed, and how often a change of one is told by its name and joint.
+// How often a healthy arm is called changed, and how often a change of one is reported by its name and joint.
 #pragma once
 
 #include <cstdint>

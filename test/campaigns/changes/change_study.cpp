@@ -64,10 +64,10 @@ diagnosis::ChangeLook look_of(const changes::Changes& found, double from, double
   return look;
 }
 
-/// Healthy joints, looked at each minute: how many changes one look found, how many were told.
+/// Healthy joints, looked at each minute: how many changes one look found, how many were reported.
 void healthy(const Options& options) {
   Random random(options.seed);
-  long looks = 0, cannot = 0, suspected = 0, told = 0, different = 0;
+  long looks = 0, cannot = 0, suspected = 0, reported = 0, different = 0;
   double seconds = 0;
   const double rate = diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1);
   while (seconds < 3600 * options.hours) {
@@ -90,19 +90,19 @@ void healthy(const Options& options) {
       }
     }
     seconds += stream.time.back();
-    for (const diagnosis::KnownChange& c : ledger.told()) {
-      ++told;
+    for (const diagnosis::KnownChange& c : ledger.reported()) {
+      ++reported;
       const double size = c.found.size.empty() ? 0 : c.found.size.front().value;
       fmt::print(
-          "told: {} {:.3g}, gain {:.3g}, of a joint with {:.2g} N m dry and {:.2g} N m s/rad viscous "
+          "reported: {} {:.3g}, gain {:.3g}, of a joint with {:.2g} N m dry and {:.2g} N m s/rad viscous "
           "friction\n",
           c.found.effect, size, c.found.gain, joint.coulomb, joint.viscous);
     }
   }
   fmt::print(
       "healthy: {:.1f} h, {} looks, {} cannot tell; {:.3g} false alarms allowed; looks that found one {}, "
-      "changes told {}, looks with an unexplained difference {}\n",
-      seconds / 3600, looks, cannot, options.rate * seconds / 3600, suspected, told, different);
+      "changes reported {}, looks with an unexplained difference {}\n",
+      seconds / 3600, looks, cannot, options.rate * seconds / 3600, suspected, reported, different);
 }
 
 /// The samples of so much motion, rests among them.

@@ -132,7 +132,7 @@ void judge(const changes::Changes& found, const Drawn& drawn, const Added& added
       if (c.effect != "unknown" && !contains(drawn.beside, c.effect)) {
         wrong = true;
         fmt::print(
-            "{} {:.3g} since {:.1f} (place {:.2f} width {:.3f} order {:.0f}): told {} ({}) since {:.1f}, "
+            "{} {:.3g} since {:.1f} (place {:.2f} width {:.3f} order {:.0f}): reported {} ({}) since {:.1f}, "
             "gain {:.3g}\n",
             drawn.kind, added.size, added.since, added.place, added.width, added.order, c.effect,
             fmt::join(c.alike, " "), c.since, c.gain);

@@ -206,8 +206,8 @@ Outcomes traced(const model::Rig& declared, const record::Record& record, const 
     if (!with) throw CannotIdentify("the fit fails");
     h = *with;
   }
-  constexpr double kMisfit = 1.5;  // as identify: beyond it a fit says that it is not complete
-  if (const Misfit& m = misfit(h); std::max(m.torque, m.deflection) > kMisfit)
+  constexpr double kIncompleteFit = 1.5;  // as identify: beyond it a fit says that it is not complete
+  if (const Misfit& m = misfit(h); std::max(m.torque, m.deflection) > kIncompleteFit)
     throw CannotIdentify(
         fmt::format("the fit says that it lacks something: torque {:.2g}, deflection {:.2g} times the noise",
                     m.torque, m.deflection));

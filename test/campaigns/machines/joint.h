@@ -14,7 +14,7 @@
 
 namespace machines {
 
-/// Sines over time that nothing of the machine's state tells.
+/// Sines over time that follow nothing of the machine's state.
 struct Swings {
   struct Sine {
     double amplitude, frequency, phase;  // any unit, rad/s, rad

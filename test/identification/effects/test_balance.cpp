@@ -12,7 +12,7 @@ namespace backlash::identification {
 namespace {
 
 constexpr double kCutoff = 15;  // Hz, a third of the mesh resonance of this servo (45 Hz)
-constexpr double kTelling = 1e-3;
+constexpr double kStrength = 1e-3;
 constexpr int kBlocks = 12;
 constexpr double kEarlier = 0.6;
 
@@ -38,7 +38,7 @@ struct Shown {
     const Balance balance(machine, data, {kCutoff, kCutoff});
     Eigen::MatrixXd columns(balance.left().size(), Eigen::Index(terms.size()));
     for (std::size_t i = 0; i < terms.size(); ++i)
-      columns.col(Eigen::Index(i)) = balance.column(*terms[i], kTelling);
+      columns.col(Eigen::Index(i)) = balance.column(*terms[i], kStrength);
     return balance.explained(columns, kBlocks, kEarlier);
   }
 
@@ -85,7 +85,7 @@ TEST(Balance, ShowsNothingWhereNothingIsMissing) {
 TEST(Balance, AColumnIsTheChangeOfWhatIsLeft) {
   const Shown shown({friction("asymmetric_coulomb", {{"torque", 12}})});
   const Balance balance(shown.machine, shown.data, {kCutoff, kCutoff});
-  const Eigen::VectorXd column = balance.column(*friction("asymmetric_coulomb", {{"torque", 12}}), kTelling);
+  const Eigen::VectorXd column = balance.column(*friction("asymmetric_coulomb", {{"torque", 12}}), kStrength);
   // With the whole effect what is left is what is left of a healthy machine: a tenth of it at most.
   EXPECT_LT((balance.left() + column).squaredNorm(), balance.left().squaredNorm());
   EXPECT_NEAR(-column.dot(balance.left()) / column.squaredNorm(), 1, 0.1);

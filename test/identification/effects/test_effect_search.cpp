@@ -177,7 +177,7 @@ TEST(EffectSearch, ATorqueThatIsASampleLateIsNamed) {
   expect_at_floor(trace);
 }
 
-// The motion hardly dwells at the speeds where the exponents 1 and 2 differ; only fitted do they tell.
+// The motion hardly dwells at the speeds where the exponents 1 and 2 differ; only fitted do they show.
 TEST(EffectSearch, TheExponentOfStribeckIsThatWhichLeavesLeast) {
   model::Rig machine = test::other_servo();
   ParameterValues values{{"torque", 25}, {"speed", 0.0255}, {"exponent", 2}};
@@ -211,7 +211,7 @@ TEST(EffectSearch, LearnsAMapOfWhatHasNoName) {
   EXPECT_EQ(trace.steps[0].words.at("acts_on"), "motor");
   const TraceChannel& torque = trace.channels.at("torque");
   EXPECT_LT(torque.after, 0.6 * torque.before);  // the points of the map are as far apart as the bump is wide
-  // Of those points a part of the bump is left over: its shape is told, not what it is.
+  // Of those points a part of the bump is left over: its shape is reported, not what it is.
   EXPECT_EQ(trace.verdict == TraceVerdict::effect_found, !trace.unexplained);
 }
 
@@ -334,7 +334,7 @@ TEST(EffectSearch, ACoupledMachineHasNoComplianceThatTheUnseenRecordContradicts)
   EXPECT_NEAR(right.parameters.at("mesh_stiffness").value / 1.2e7, 1, 0.05);
 }
 
-TEST(EffectSearch, RefusesRecordsThatCannotTell) {
+TEST(EffectSearch, RefusesRecordsThatDoNotShowTheMachine) {
   const model::Rig rig = test::servo_file().rig;
   const record::Record record = simulation::simulate_record(rig, test::servo_run(11), 3),
                        unseen = simulation::simulate_record(rig, test::servo_run(12), 3);

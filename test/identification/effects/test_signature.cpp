@@ -31,7 +31,7 @@ TEST(Signature, NoiseOfAnotherColourIsNotMissing) {
   std::vector<ChannelRemainder> all = {left_of_torque(0.02, -0.01, 1.5)};
   all.front().left.signal = 600;
   EXPECT_FALSE(signature(all, false, {}));
-  EXPECT_EQ(noise_notes(all, {}).size(), 1u);  // but is told
+  EXPECT_EQ(noise_notes(all, {}).size(), 1u);  // but is reported
 }
 
 // A torque from outside, or friction that swings in time, follows no state, and a tenth of the signal is no
@@ -51,7 +51,7 @@ TEST(Signature, ButATenthOfTheTorqueIsNoNoise) {
   EXPECT_TRUE(signature({c}, false, {}));
 }
 
-TEST(Signature, WhatIsNotToldFromNothingIsNotMissing) {
+TEST(Signature, WhatDoesNotDifferFromNothingIsNotMissing) {
   ChannelRemainder c = left_of_torque(0.2, -0.05, 1.5);
   c.left.signal = 600;
   EXPECT_FALSE(signature({c}, false, {}));

@@ -364,7 +364,7 @@ TEST(Believe, DropsWhatTheUnseenRecordContradicts) {
   EXPECT_NE(reason(believed, "cogging").find("on the unseen record"), std::string::npos);
 }
 
-TEST(BelieveTogether, DropsAllWhereTheyTellNoMoreThanTheDeclaredMachine) {
+TEST(BelieveTogether, DropsAllWhereTheyExplainNoMoreThanTheDeclaredMachine) {
   const SearchBench bench{with_cogging()};
   const Hypothesis declared = fit_declared(test::one_inertia_rig(), bench.context);
   const Hypothesis h = *refitted(declared, {cogging_effect(0.8, 7, 0.6)}, bench.context);

@@ -65,7 +65,7 @@ TEST(OutputError, FindsALoadEncoderThatIsLate) {
 
 // The machine is the simulator's; torque of another axis, 600 N m in the rhythm of its own, is added to the
 // channel and, over the stiffness, to the deflection. Two standard errors.
-TEST(OutputError, ACoupledMachineTellsItsSkew) {
+TEST(OutputError, ACoupledMachineShowsItsSkew) {
   rig_file::RigFile file = rig_file::load_rig_file(test::package_file("config/kr300.yaml"));
   for (const double skew : {0.0, 3e-3}) {
     file.rig.encoder_skew = skew;

@@ -45,7 +45,7 @@ double speed(double amplitude) {
   return 0.5 * M_PI * amplitude / std::sqrt(2);  // root mean square
 }
 
-TEST(ServoData, TellsTheSpeedOfALockedMotorThatCrawls) {
+TEST(ServoData, EstimatesTheSpeedOfALockedMotorThatCrawls) {
   const ServoData data = servo_data(rounded_sine(kSlow), locked());
   // Raw, the rounding (uniform over a step) times the rate of a five-point difference is as large as the
   // speed.
@@ -61,7 +61,7 @@ TEST(ServoData, LeavesAClearSpeedAlone) {
   const record::Record record = rounded_sine(kFast);
   const ServoData data = servo_data(record, locked());
   EXPECT_EQ(data.motor, record.column(record::Channel::motor_position));
-  // At least that of the rounding; the step is told from the record to the last digits.
+  // At least that of the rounding; the step is known from the record to the last digits.
   EXPECT_GE(data.rate_noise, 0.9999 * 0.95 * kStep / std::sqrt(12.0) / kInterval);
 }
 

@@ -118,7 +118,7 @@ TEST(Clearance, StandardErrorCoversTheScatter) {
   EXPECT_LT(std::sqrt(squares / stated), 1.6);
 }
 
-TEST(Clearance, WhatCannotBeToldIsRefused) {
+TEST(Clearance, WhatIsNotDeterminedIsRefused) {
   const TwoMasses machine = pushed(42, 80, 1.5);
   const record::Record record = simulate(machine, 4);
   record::Record blind = record;

@@ -169,7 +169,7 @@ TEST(Decay, LostContactIsNotUsed) {
             0.1);
 }
 
-TEST(Decay, WrongStiffnessIsTold) {
+TEST(Decay, WrongStiffnessIsReported) {
   const TwoMasses machine = square_wave(200, 1);
   DecaySettings settings = settings_of(machine);
   settings.stiffness.value *= 1.3;
@@ -179,7 +179,7 @@ TEST(Decay, WrongStiffnessIsTold) {
   EXPECT_NEAR(d.damping_by_rate.value, machine.damping, 0.01 * machine.damping);  // does not need it
 }
 
-TEST(Decay, WhatCannotBeToldIsRefused) {
+TEST(Decay, WhatIsNotDeterminedIsRefused) {
   const DecaySettings settings = settings_of(230);
   EXPECT_THROW(identify_decay(closed_form(0.15, 230, 0.2, 1), settings),
                CannotIdentify);  // below the noise

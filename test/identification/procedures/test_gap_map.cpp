@@ -115,7 +115,7 @@ TEST(GapMap, CentreLineIsTheMeanOfBothFlanks) {
   EXPECT_TRUE(std::isnan(map.mean_gap.value));
 }
 
-TEST(GapMap, FlatGapIsToldFlat) {
+TEST(GapMap, FlatGapIsReportedFlat) {
   int alarms = 0;
   const int runs = 40;
   for (int seed = 0; seed < runs; ++seed) {
@@ -192,7 +192,7 @@ TEST(GapMap, SimulatedRunsOfTheMachine) {
   settings.friction_forward.value = settings.friction_reverse.value = 15 + 5 * 0.8;
   const GapMap map = identify_gap_map(simulated(0.8), simulated(-0.8), settings);
   EXPECT_EQ(map.coverage, 1);
-  // The wind-up of 24 % is told from the gap to 0.5 %.
+  // The wind-up of 24 % is separated from the gap to 0.5 %.
   EXPECT_NEAR(map.mean_separation.value, 4.4e-4 + 2 * 19 / 355e3, 0.005 * 4.4e-4);
   EXPECT_NEAR(map.mean_gap.value, 4.4e-4, 0.005 * 4.4e-4);
   ASSERT_GE(map.harmonics.size(), 1u);
@@ -210,28 +210,28 @@ rig_file::Drive thesis_drive() {
 // pinion's order as well (18.7 in the recipe).
 TEST(GapMap, WhatTurnsWithThePinionIsFound) {
   for (const double turns : {1.3, 3.1})
-    for (const bool told : {true, false}) {
+    for (const bool declared : {true, false}) {
       Recipe r;
       r.pinion = 0.08;
       r.turns = turns;
       GapMapSettings settings;
-      if (told) settings.drive = thesis_drive();
+      if (declared) settings.drive = thesis_drive();
       const GapMap map = map_of(r, settings);
-      ASSERT_EQ(map.waves.waves.size(), 1u) << turns << told;
+      ASSERT_EQ(map.waves.waves.size(), 1u) << turns << declared;
       const GapWave& w = map.waves.waves[0];
-      EXPECT_NEAR(w.order.value, 280.0 / 15, told ? 1e-9 : 4 * w.order.standard_error) << turns;
-      EXPECT_EQ(w.pinion, told ? 1 : 0);
-      if (!told) EXPECT_LT(w.order.standard_error, turns > 3 ? 2e-3 : 2e-2);
-      EXPECT_NEAR(w.amplitude.value, 0.08 * r.gap, 4 * w.amplitude.standard_error) << turns << told;
+      EXPECT_NEAR(w.order.value, 280.0 / 15, declared ? 1e-9 : 4 * w.order.standard_error) << turns;
+      EXPECT_EQ(w.pinion, declared ? 1 : 0);
+      if (!declared) EXPECT_LT(w.order.standard_error, turns > 3 ? 2e-3 : 2e-2);
+      EXPECT_NEAR(w.amplitude.value, 0.08 * r.gap, 4 * w.amplitude.standard_error) << turns << declared;
       EXPECT_LT(w.amplitude.standard_error, 0.03 * 0.08 * r.gap);
-      EXPECT_NEAR(w.phase.value, 0.4, 4 * w.phase.standard_error) << turns << told;
-      ASSERT_EQ(map.harmonics.size(), 2u) << turns << told;  // 3 and 5, as without the pinion
+      EXPECT_NEAR(w.phase.value, 0.4, 4 * w.phase.standard_error) << turns << declared;
+      ASSERT_EQ(map.harmonics.size(), 2u) << turns << declared;  // 3 and 5, as without the pinion
       EXPECT_NEAR(map.harmonics[0].amplitude.value, 0.1 * r.gap, 0.005 * r.gap);
       for (double q = r.start; q < r.start + turns * kTurn; q += 0.01)
         EXPECT_NEAR(map.gap_at(q), r.at(q), 0.01 * r.gap) << q;
       EXPECT_NE(map.statement.find("order 18.6"), std::string::npos) << map.statement;
       // 280 and 15 teeth meet as before after 15 / 5 turns of the load.
-      if (told) EXPECT_EQ(map.waves.turns_to_meet, 3);
+      if (declared) EXPECT_EQ(map.waves.turns_to_meet, 3);
     }
 }
 
@@ -291,27 +291,27 @@ Recipe before(Recipe r) {
 }
 
 // Two runs from one start lie a turn apart and share no place. The centre line has the pinion's order too.
-TEST(GapMap, RunsFromOneStartTellThePinionToo) {
+TEST(GapMap, RunsFromOneStartShowThePinionToo) {
   for (const double part : {0.08, 0.0})
-    for (const bool told : {true, false}) {
+    for (const bool declared : {true, false}) {
       Recipe r;
       r.pinion = part;
       r.turns = 1.4;
       r.centre_order = 280.0 / 15;
       GapMapSettings settings;
-      if (told) settings.drive = thesis_drive();
+      if (declared) settings.drive = thesis_drive();
       const GapMap map = identify_gap_map(run(r, r.speed), run(before(r), -r.speed), settings);
-      ASSERT_EQ(map.waves.waves.size(), part > 0 ? 1u : 0u) << told;
+      ASSERT_EQ(map.waves.waves.size(), part > 0 ? 1u : 0u) << declared;
       if (part == 0) continue;
       const GapWave& w = map.waves.waves[0];
-      EXPECT_NEAR(w.order.value, 280.0 / 15, told ? 1e-9 : 4 * w.order.standard_error);
-      EXPECT_NEAR(w.amplitude.value, part * r.gap, 4 * w.amplitude.standard_error) << told;
+      EXPECT_NEAR(w.order.value, 280.0 / 15, declared ? 1e-9 : 4 * w.order.standard_error);
+      EXPECT_NEAR(w.amplitude.value, part * r.gap, 4 * w.amplitude.standard_error) << declared;
       EXPECT_LT(w.amplitude.standard_error, 0.1 * part * r.gap);
     }
 }
 
-// Here the centre line has an order of its own, 18.7, that a turn and a half does not tell from the gap's:
-// then nothing is said of either, or what is said holds.
+// Here the centre line has an order of its own, 18.7, that a turn and a half does not distinguish from the
+// gap's: then nothing is said of either, or what is said holds.
 TEST(GapMap, RunsFromOneStartDoNotMixGapAndCentreLine) {
   for (const double part : {0.08, 0.0})
     for (int seed = 0; seed < 3; ++seed) {
@@ -361,18 +361,18 @@ TEST(GapMap, SimulatedMachineWhoseGapFollowsBothGears) {
   settings.stiffness.value = machine.stiffness;
   settings.friction_forward.value = settings.friction_reverse.value = 15;
   const record::Record forward = simulated(0.25), reverse = simulated(-0.25);
-  for (const bool told : {true, false}) {
-    if (told)
+  for (const bool declared : {true, false}) {
+    if (declared)
       settings.drive = thesis_drive();
     else
       settings.drive.reset();
     const GapMap map = identify_gap_map(forward, reverse, settings);
-    ASSERT_EQ(map.waves.waves.size(), 1u) << told;
+    ASSERT_EQ(map.waves.waves.size(), 1u) << declared;
     const GapWave& w = map.waves.waves[0];
     EXPECT_NEAR(w.order.value, 280.0 / 15, 0.01);
     // The damper of this machine does not know that its walls move: 2 c / k times the rate of the centre, 0.3
     // %.
-    EXPECT_NEAR(w.amplitude.value, 0.1 * 4.4e-4, 0.01 * 0.1 * 4.4e-4) << told;
+    EXPECT_NEAR(w.amplitude.value, 0.1 * 4.4e-4, 0.01 * 0.1 * 4.4e-4) << declared;
     ASSERT_GE(map.harmonics.size(), 1u);
     EXPECT_EQ(map.harmonics[0].order, 1);
     EXPECT_NEAR(map.harmonics[0].amplitude.value, 0.15 * 4.4e-4, 0.02 * 0.15 * 4.4e-4);
@@ -380,7 +380,7 @@ TEST(GapMap, SimulatedMachineWhoseGapFollowsBothGears) {
   }
 }
 
-TEST(GapMap, LittleMoreThanATurnCannotTellThePinion) {
+TEST(GapMap, LittleMoreThanATurnDoesNotShowThePinion) {
   Recipe r;
   r.pinion = 0.08;
   r.turns = 0.9;
@@ -403,7 +403,7 @@ TEST(GapMap, PartOfATurnIsSaid) {
     EXPECT_NEAR(map.gap_at(q), r.at(q), 0.01 * r.gap) << q;
 }
 
-TEST(GapMap, WhatCannotBeToldIsRefused) {
+TEST(GapMap, WhatIsNotDeterminedIsRefused) {
   const Recipe r;
   const record::Record forward = run(r, r.speed), reverse = run(r, -r.speed);
   EXPECT_NO_THROW(identify_gap_map(reverse, forward));  // either order

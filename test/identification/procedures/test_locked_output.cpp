@@ -162,14 +162,14 @@ Draw drawn(int seed) {
 
 TEST(LockedOutput, IntervalsHoldOfDrawnJoints) {
   constexpr int kDraws = 30;
-  std::map<std::string, int> told, missed;
+  std::map<std::string, int> answered, missed;
   for (int i = 1; i <= kDraws; ++i) {
     const Draw draw = drawn(i);
     const Identification found = identify(cycloidal().rig, {draw.record});
     for (const auto& [name, truth] : draw.truth) {
       const auto at = found.parameters.find(name);
       if (at == found.parameters.end()) continue;
-      ++told[name];
+      ++answered[name];
       const double off = std::fabs(at->second.value - truth) / at->second.standard_error;
       missed[name] += off > 1.96;
       EXPECT_LT(off, 6) << name << ", draw " << i;  // wrong and sure: beyond twice the width of the interval
@@ -178,11 +178,11 @@ TEST(LockedOutput, IntervalsHoldOfDrawnJoints) {
   // Of 30 intervals that hold in 95 % more than five miss with a chance of 0.3 %.
   for (const auto& [name, count] : missed) EXPECT_LE(count, 5) << name;
   for (const char* name : {"backlash_angle", "mesh_stiffness", "motor_coulomb"})
-    EXPECT_EQ(told[name], kDraws);
-  EXPECT_GE(told["motor_viscous"], kDraws / 2);
+    EXPECT_EQ(answered[name], kDraws);
+  EXPECT_GE(answered["motor_viscous"], kDraws / 2);
 }
 
-TEST(LockedOutput, WhatTheRecordDoesNotTellStaysAsTheFileSaysIt) {
+TEST(LockedOutput, WhatTheRecordDoesNotShowStaysAsTheFileSaysIt) {
   const rig_file::RigFile file = cycloidal();
   rig_file::RigFile machine = file;
   machine.rig = with_values(machine.rig, 400, 0);  // no gap: the motor never moves fast

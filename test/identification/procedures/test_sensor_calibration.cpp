@@ -148,7 +148,7 @@ TEST(SpeedCalibration, StandardErrorsAreHonest) {
   EXPECT_NEAR(squares / stated, 0.95, 0.5);  // as above
 }
 
-TEST(SpeedCalibration, OneSpeedCannotTellScaleFromOffset) {
+TEST(SpeedCalibration, OneSpeedDoesNotSeparateScaleFromOffset) {
   record::Record record;
   record.name = "even";
   for (int i = 0; i < 5000; ++i) {

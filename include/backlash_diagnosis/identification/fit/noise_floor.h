@@ -19,7 +19,7 @@
 namespace backlash::identification {
 
 /// Times the noise floor, beyond which a channel shows that the machine has an effect that the model lacks.
-constexpr double kMisfit = 1.5;  // choice
+constexpr double kShowsMissingEffect = 1.5;  // choice
 
 struct NoiseFloors {
   double torque = 0, deflection = 0;  // N m, rad; standard deviations after the low-pass

@@ -3,13 +3,13 @@
 // multi-start fit.
 //
 // The load is simulated driven by the recorded motor position (simulation/driven_load.h). Two residuals
-// count, each divided by its noise floor, which the record itself tells:
+// count, each divided by its noise floor, which is estimated from the record itself:
 //   torque      recorded - [J_M a_M + friction + mesh torque], both through the same zero-phase low-pass;
 //   samples near
 //               standstill do not count, there dry friction takes any value
 //   deflection  (motor - load) recorded - simulated, through the same low-pass
 // A torque that is held between samples acts half a sample later than its stamp; whether it is, the fitted
-// delay tells. A further delay of a part of a sample is calibration and fitted. So is the constant difference
+// delay shows. A further delay of a part of a sample is calibration and fitted. So is the constant difference
 // of the two encoders.
 #pragma once
 

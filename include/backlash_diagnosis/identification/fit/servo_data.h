@@ -38,8 +38,9 @@ double time_between_reversals(const ServoData& data);
 /// its root mean square the motor position is low-passed, in the widest band in which it is not. With two
 /// inertias the position stays as it is: there it drives a load.
 ///
-/// Friction of one inertia may follow what its load takes, which the acceleration tells (gear_train.h). That
-/// of the second difference is mostly noise: low-passed in the widest band in which a fiftieth of it is.
+/// Friction of one inertia may follow what its load takes, which follows from the acceleration
+/// (gear_train.h). That of the second difference is mostly noise: low-passed in the widest band in which a
+/// fiftieth of it is.
 ///
 /// The recorded speed of the load draws a simulated one (driven_load.h); what its low-pass takes away counts
 /// there like a friction. So its cutoff is 2.7 times the mesh resonance (mesh_resonance.h), or 0.2 of the

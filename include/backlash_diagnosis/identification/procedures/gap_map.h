@@ -35,7 +35,7 @@ struct GapMapSettings {
   int bins = 180;                        // per turn, 8 to 3600
   int highest_order = 20;                // 0 to bins / 4
   double false_alarm = 0.01;             // of "the gap varies", 1e-6 to 0.5
-  std::optional<rig_file::Drive> drive;  // whose last stage tells the orders of the pinion
+  std::optional<rig_file::Drive> drive;  // whose last stage gives the orders of the pinion
 };
 
 /// Values at the middle of the bin; standard errors from the scatter inside, its correlation in time

@@ -21,7 +21,7 @@ enum class GapUse {
   variation,  // the rig's own: A_n are the map's, b is not
 };
 
-/// The map with another mean gap, as a fit of the whole machine tells it; the wind-up is the rest of the
+/// The map with another mean gap, as a fit of the whole machine estimates it; the wind-up is the rest of the
 /// separation. Where the machine was fitted with the orders of the map held, their errors are part of the
 /// mean's: the fit takes it from the places that its records visit.
 GapMap with_mean_gap(GapMap map, const signal::Measured& fitted);

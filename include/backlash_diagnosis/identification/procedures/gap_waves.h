@@ -13,9 +13,9 @@
 // teeth the same two meet again after z1 / gcd(z1, z2) turns of the load.
 //
 // All whole orders up to the highest are fitted with every wave, so that a wave is only what no gap of the
-// load can say, a local fault included: in little more than a turn that is told by the stretch that is
+// load can say, a local fault included: in little more than a turn that is shown by the stretch that is
 // visited twice. A multiple of the pinion that is a whole number of the load is the load's. Orders that the
-// drive tells are tried first, then any other; each must pass an F-test (correlation of the residual
+// drive declares are tried first, then any other; each must pass an F-test (correlation of the residual
 // considered).
 #pragma once
 
@@ -30,7 +30,7 @@ namespace backlash::identification {
 
 /// One wave of the gap.
 struct GapWave {
-  signal::Measured order;             // per turn of the load; without error where the drive tells it
+  signal::Measured order;             // per turn of the load; without error where the drive declares it
   signal::Measured amplitude, phase;  // rad; of sin(order q + phase), q [rad] with its turns
   int pinion = 0, load = 0;           // k, n of order = k R + n; 0, 0: no order of the drive
   double chance = 1;                  // of so much or more by noise alone, all orders considered
@@ -44,21 +44,21 @@ struct GapRun {
 struct GapWaveSettings {
   double highest_order = 60;   // choice: of all orders, three times that of the pinion of the thesis
   double false_alarm = 1e-4;   // choice: of one wave, all orders considered
-  double least_amplitude = 0;  // rad; smaller ones are not told
+  double least_amplitude = 0;  // rad; smaller ones are not reported
   const rig_file::Drive* drive = nullptr;  // may be null
 };
 
 struct GapWaves {
   std::vector<GapWave> waves;  // by order
   double turns = 0;            // of the load, that both runs visited, or each for itself
-  double turns_to_meet = 0;    // after which the same teeth meet again; 0: the drive does not tell
+  double turns_to_meet = 0;    // after which the same teeth meet again; 0: not declared
   std::vector<std::string> warnings;
 
   double at(double position) const;  // rad, the sum of the waves; load position with its turns
 };
 
 /// Runs that share less than a turn of places, as two from one start, are fitted each over its own places,
-/// with a centre line of the same orders. Finds nothing, with a warning where the drive tells a pinion, in
+/// with a centre line of the same orders. Finds nothing, with a warning where the drive declares a pinion, in
 /// runs of less than a turn and some more. Throws InvalidParameter for settings that are not > 0.
 GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapWaveSettings& settings = {});
 

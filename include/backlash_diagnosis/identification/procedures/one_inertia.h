@@ -52,7 +52,7 @@ struct OneInertia {
 /// the widest band in which its noise is a thousandth of it, but at least four times the cutoff). The delay
 /// is an unknown like the others; where it is vague (standard error beyond one interval, or at the edge of
 /// the search, two intervals or a fifth of a period of the cutoff), it is taken as 0, its error is NaN and
-/// a warning tells; standard errors by leaving out thirtieths of the record (jackknife). Where more is left
+/// a warning says so; standard errors by leaving out thirtieths of the record (jackknife). Where more is left
 /// than 1.5 times what noise leaves, they also hold how far a likely effect that the equation lacks (drag,
 /// friction that falls with speed or depends on direction, load, position or time, gravity) may have drawn
 /// each parameter. Throws CannotIdentify where motor_torque or motor_position is missing, the record is

@@ -10,7 +10,7 @@
 
 namespace backlash::identification {
 
-constexpr double kHighestFrequency = 0.25;  // choice: of the sampling rate, that a response is told at
+constexpr double kHighestFrequency = 0.25;  // choice: of the sampling rate, that a response is given at
 
 /// Whole cycles of one sine, from a rising passage of its mean to another; in samples, may be fractions.
 struct SineRun {

@@ -47,15 +47,15 @@ struct WatchState {
   ros::WallTime last_arrival;
   std::string healthy;         // where the healthy machine is from; empty: it is not known yet
   double learning = 0;         // s of samples kept for it
-  long looks = 0, judged = 0;  // done, and those that could tell
+  long looks = 0, judged = 0;  // done, and those with an answer
   long left_out = 0;           // looks that were due while one ran
-  std::string why_not;         // why the last look could not tell; empty: it could
-  std::string log_problem;     // why what was told is not in the log
-  double from = 0, to = 0;     // s since 1970, of the last look that could tell
+  std::string why_not;         // why the last look has no answer; empty: it has one
+  std::string log_problem;     // why what was reported is not in the log
+  double from = 0, to = 0;     // s since 1970, of the last look with an answer
   long windows = 0;            // of motion, in it
   std::vector<diagnosis::KnownChange> changes;
   std::vector<std::string> different;  // since an unknown time
-  std::vector<std::string> unjudged;   // joints of which the last look that could tell tells nothing, and why
+  std::vector<std::string> unjudged;   // joints that the last look with an answer leaves out, and why
 };
 
 class JointWatch {

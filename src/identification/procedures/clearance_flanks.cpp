@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/identification/procedures/flank_fit.h"
+#include "backlash_diagnosis/identification/procedures/clearance_flanks.h"
 
 #include <algorithm>
 #include <cmath>
