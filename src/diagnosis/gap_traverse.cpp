@@ -28,15 +28,15 @@ constexpr double kFirstNoise = 0.05;                    // of the width, of what
 constexpr double kUnsureFriction = 0.5;  // of the declared dry friction of the motor, as the fit has it
 constexpr double kUnsureTorque = 2;      // theory: 95 % of what nothing explains
 // The gates.
-constexpr double kFewOf = 0.35;    // of all crossings: simulation, see require_most()
-constexpr int kFewestPressed = 5;  // windows, for each flank
-constexpr double kPressed = 0.1;   // of the usual torque, in one of them
-constexpr double kLong = 0.1;      // of its samples
+constexpr double kLeastShare = 0.35;  // of all crossings: simulation, see require_most()
+constexpr int kFewestPressed = 5;     // windows, for each flank
+constexpr double kPressed = 0.1;      // of the usual torque, in one of them
+constexpr double kLong = 0.1;         // of its samples
 constexpr double kMoved =
-    1e-3;                   // spreads: a fit that moves no value of the machine at all found nowhere to go
-constexpr double kFar = 4;  // spreads of a declared value
-constexpr double kLeft = 0.35;  // of the deflection or the torque, that is not explained
-constexpr double kVague = 4;    // upper over lower end of an interval, by which it says too little
+    1e-3;  // spreads: a fit that moves no value of the machine at all found nowhere to go
+constexpr double kFarFromDeclared = 4;  // spreads of a declared value
+constexpr double kLeft = 0.35;          // of the deflection or the torque, that is not explained
+constexpr double kVague = 4;            // upper over lower end of an interval, by which it says too little
 // The interval.
 constexpr double kLaw = 0.2;  // of a flank's deflection, 95 %: laws of teeth in no prior: simulation
 // Theory: Hertz's flanks fitted by lines move the gap by 0.30 of the deflection, and leave 0.0327 rms.
@@ -85,7 +85,7 @@ void require_declared(const TraverseFit& fit) {
                   "the load's motion in the gap cannot be followed: it bounces from flank to flank "
                   "faster than the declared machine; slower moves would do"};
   for (const int k : {kTraverseStiffness, kTraverseLoadInertia, kTraverseMotorInertia})
-    if (std::fabs(fit.fit.shared[k]) > kFar)
+    if (std::fabs(fit.fit.shared[k]) > kFarFromDeclared)
       throw Refusal{Status::out_of_domain,
                     fmt::format("the record fits only a machine far from that of the rig file: {} {:.3g}",
                                 fit.windows->shared()[std::size_t(k)].name, fit.fit.value(k))};
@@ -200,12 +200,12 @@ void require_crossings(const TraverseData& data, int fewest) {
 /// Those that are left out take long, or begin in no clear press, as of a large play they do: where they are
 /// many, the others have shown a play of half the size, with nothing but noise left.
 void require_most(const TraverseData& data) {
-  if (double(data.within) >= kFewOf * double(data.crossings)) return;
+  if (double(data.within) >= kLeastShare * double(data.crossings)) return;
   throw Refusal{
       Status::insufficient_data,
       fmt::format("{} of {} crossings of the gap can be looked at, the others are too slow or begin "
                   "in no clear press on a flank, as those of a larger play: {:.0f} % are needed",
-                  data.within, data.crossings, 100 * kFewOf)};
+                  data.within, data.crossings, 100 * kLeastShare)};
 }
 
 /// Crossings that begin in a clear press whatever is wrong with the declared friction of the motor.

@@ -29,7 +29,7 @@ struct TraverseData {
   std::vector<double> torque;               // N m, of the motor
   std::vector<double> position, rate;       // rad, rad/s
   std::vector<double> acceleration;         // rad/s^2, second difference
-  std::vector<char> counts;                 // whether dry friction is told: not about a standstill
+  std::vector<char> counts;                 // whether dry friction is known: not about a standstill
   std::vector<double> waves[kTorqueWaves];  // of unit amplitude, over the motor's turn; empty: none was found
   double noise = 0, slope_noise = 0;        // N m, N m/s, of the averaged torque through the teeth
   double torque_noise = 0;                  // N m, of a sample of the torque, white

@@ -46,9 +46,9 @@ Fits run_some(Fits fits) {
 }
 
 /// Another fit's machine on these windows.
-TraverseFit gone_on(const TraverseData& data, const GapTraverseSettings& settings,
-                    const std::vector<TraverseWindow>& windows, const TraverseFit& from, double noise,
-                    const fit::FitOptions& options = {}) {
+TraverseFit continued(const TraverseData& data, const GapTraverseSettings& settings,
+                      const std::vector<TraverseWindow>& windows, const TraverseFit& from, double noise,
+                      const fit::FitOptions& options = {}) {
   TraverseFit fit(data, settings, windows, from.fit.shared, noise);
   if (from.fit.own.size() == windows.size()) fit.begin_with_own_of(from);
   fit.fit.run(options);
@@ -62,12 +62,12 @@ bool sure(const TraverseFit& fit) {
 /// Of half a record, on from the fit of the whole; where that leads nowhere, from other gaps.
 TraverseFit half_of(const TraverseData& data, const GapTraverseSettings& settings,
                     const std::vector<TraverseWindow>& half, const TraverseFit& whole) {
-  TraverseFit fit = gone_on(data, settings, half, whole, whole.noise());
+  TraverseFit fit = continued(data, settings, half, whole, whole.noise());
   if (sure(fit)) return fit;
   std::vector<double> gaps;
   for (const double factor : kGapFactors) gaps.push_back(factor * whole.gap());
   const Fits others = traverse_guesses(data, settings, half, whole.fit.shared, gaps, whole.noise());
-  return others.empty() ? std::move(fit) : gone_on(data, settings, half, others[0], whole.noise());
+  return others.empty() ? std::move(fit) : continued(data, settings, half, others[0], whole.noise());
 }
 
 /// Adds those of either half of the record, where they are sure of another play: one that steps or grows.
@@ -129,7 +129,7 @@ Fits solve_traverse(TraverseData& data, const GapTraverseSettings& settings,
                     const std::vector<TraverseWindow>& windows, const Fits& guesses) {
   const std::vector<TraverseWindow> all = spread_evenly(windows, kTraverseWindows);
   Fits fits;
-  fits.push_back(gone_on(data, settings, all, guesses[0], guesses[0].noise()));
+  fits.push_back(continued(data, settings, all, guesses[0], guesses[0].noise()));
   double noise = fits[0].noise_left();
   if (data.load.empty()) noise = std::max(1.0, noise);
   if (std::fabs(noise / fits[0].noise() - 1) > kOtherNoise) {  // once more, with what it has shown of itself
@@ -137,7 +137,7 @@ Fits solve_traverse(TraverseData& data, const GapTraverseSettings& settings,
       data.shown_spread = std::max(2 * data.load_noise, fits[0].rms_of_own(kOwnShown));
       data.load_torque_spread = std::max(data.load_torque_spread, fits[0].rms_of_own(kOwnLoadTorque));
     }
-    fits[0] = gone_on(data, settings, all, fits[0], noise);
+    fits[0] = continued(data, settings, all, fits[0], noise);
   }
   noise = fits[0].noise();
   // A fit stops where it is cheapest nearby.
@@ -145,9 +145,9 @@ Fits solve_traverse(TraverseData& data, const GapTraverseSettings& settings,
   for (const double factor : kBeside) beside.push_back(factor * fits[0].gap());
   for (const TraverseFit& other :
        traverse_guesses(data, settings, windows, fits[0].fit.shared, beside, noise))
-    if (!alike(other, fits[0])) fits.push_back(gone_on(data, settings, all, other, noise));
+    if (!alike(other, fits[0])) fits.push_back(continued(data, settings, all, other, noise));
   for (std::size_t i = 1; i < guesses.size() && i < kGoneOn; ++i)
-    fits.push_back(gone_on(data, settings, all, guesses[i], noise));
+    fits.push_back(continued(data, settings, all, guesses[i], noise));
   std::stable_sort(fits.begin(), fits.end(),
                    [](const auto& a, const auto& b) { return a.fit.cost() < b.fit.cost(); });
   const double most = fits[0].fit.cost() + kRivalCost * TraverseErrors(fits[0]).scale();
@@ -156,7 +156,7 @@ Fits solve_traverse(TraverseData& data, const GapTraverseSettings& settings,
   while (!(fits.back().fit.cost() <= most)) fits.pop_back();
   fit::FitOptions to_the_end;
   to_the_end.tolerance = kConverged;
-  fits[0] = gone_on(data, settings, all, fits[0], noise, to_the_end);
+  fits[0] = continued(data, settings, all, fits[0], noise, to_the_end);
   add_halves(fits, data, settings, all);
   return fits;
 }

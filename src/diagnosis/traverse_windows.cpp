@@ -26,11 +26,11 @@ constexpr double kUsualHardening = 0.15, kKnownHardening = 1;  // choice: 0.05 t
 constexpr double kEccentricity = 2e-4;          // rad, of an encoder's disk: 5 um of a radius of 25 mm
 constexpr double kSkew = 1e-3;                  // s, of the load's encoder: choice
 constexpr double kStartSpread[] = {0.5, 5e-2};  // of the deflection, of the rms speed's scale: choice
-constexpr double kSlowTorque = 0.05;            // of the level, a torque that nothing tells: choice
+constexpr double kSlowTorque = 0.05;            // of the level, a torque that nothing shows: choice
 constexpr double kSlowTime = 0.4;               // windows, within which it changes: choice
 constexpr double kLeastNoise = 0.1;             // of the torque's variance, white whatever else is: choice
 constexpr double kFastPart = 8;                 // the position counts as so many times noisier: simulation
-constexpr double kUnexplained = 0.1;            // of the level: a torque on the motor that nothing else tells
+constexpr double kUnexplained = 0.1;            // of the level: a torque on the motor that nothing else shows
 constexpr double kUnexplainedLoad = 0.5;        // the same on the load: gravity
 
 fit::Priors shared_priors(const TraverseData& data, const GapTraverseSettings& s) {
@@ -102,7 +102,7 @@ TraverseWindows::TraverseWindows(const TraverseData& data, const GapTraverseSett
 }
 
 /// What is left of a torque has three parts: its noise, of which two samples are averaged; that of the
-/// position, which two differences make large and fast; and a slow torque that nothing tells. The noise of
+/// position, which two differences make large and fast; and a slow torque that nothing shows. The noise of
 /// the position comes in as a factor of the motor's inertia, which would be fitted too small where it counted
 /// as much as it is: its fast part is all but left out.
 TraverseWindows::Weights TraverseWindows::weights_of(const TraverseWindow& window) const {

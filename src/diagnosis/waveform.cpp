@@ -29,11 +29,11 @@ constexpr double kMostLeftOut = 0.5;  // of the windows: choice
 constexpr double kFarthest = 4;       // spreads, of an inertia or a stiffness: choice
 constexpr double kVague = 4;      // upper over lower end of an interval, by which it says too little: choice
 constexpr double kRivalCost = 9;  // chi^2 of three standard errors: theory
-// What the message tells of the file: values beyond what it says of them, one spread, and surely so, as the
-// record tells them. A message that is wrong costs a commissioning; one that lacks hides a wrong file.
+// What the message says of the file: values beyond what it says of them, one spread, and surely so, as the
+// record shows them. A message that is wrong costs a commissioning; one that lacks hides a wrong file.
 // Choices.
-constexpr double kFar = 1;        // spreads
-constexpr double kErrorsFar = 3;  // standard errors
+constexpr double kBeyondSpread = 1;  // spreads
+constexpr double kErrorsFar = 3;     // standard errors
 
 void check(const WaveformSettings& s) {
   const auto require = [](const char* name, double value) {
@@ -104,13 +104,13 @@ namespace {
 double error_of(const WaveformSolution& s, std::size_t k) {
   const fit::Prior& prior = s.priors.shared[k];
   if (!(prior.spread > 0)) return kNaN;
-  return s.told[k] * prior.spread * (prior.factor ? s.values[k] : 1);
+  return s.left_of_spread[k] * prior.spread * (prior.factor ? s.values[k] : 1);
 }
 
 std::vector<ContradictedValue> contradicted(const WaveformSolution& s, const WaveformSettings& settings) {
   std::vector<ContradictedValue> found;
   for (std::size_t k = kHalfGap + 1; k <= kSensorGain; ++k)
-    if (deviations(s, k) > kFar && std::fabs(s.z[k]) > kErrorsFar * s.told[k])
+    if (deviations(s, k) > kBeyondSpread && std::fabs(s.z[k]) > kErrorsFar * s.left_of_spread[k])
       found.push_back({waveform_value_name(static_cast<int>(k)),
                        waveform_quantities()[k - 1].unit_in(settings),  // both start with the motor's damping
                        s.priors.shared[k].centre, s.values[k], error_of(s, k)});
@@ -121,7 +121,7 @@ std::vector<ContradictedValue> contradicted(const WaveformSolution& s, const Wav
 std::string lacking_text(const WaveformSolution& s) {
   std::string text;
   for (std::size_t k = kStribeck; k < kGlobalValues; ++k)
-    if (std::fabs(s.z[k]) > kFar && std::fabs(s.z[k]) > kErrorsFar * s.told[k])
+    if (std::fabs(s.z[k]) > kBeyondSpread && std::fabs(s.z[k]) > kErrorsFar * s.left_of_spread[k])
       text += fmt::format("{} {:.2g}, ", waveform_value_name(static_cast<int>(k)), s.values[k]);
   text += fmt::format("{:.2g} % of the torque",
                       100 * s.misfit[kTorqueChannel].left() / s.misfit[kTorqueChannel].swing);
@@ -203,7 +203,7 @@ void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settin
   e.message = message_of(s, e.declared_wrong);
   e.status = some ? Status::ok : Status::below_range;
   if (some) return;
-  e.message = "no more play than equations of rigid flanks can tell; " + e.message;
+  e.message = "no more play than equations of rigid flanks resolve; " + e.message;
   e.backlash = e.backlash_angle = kNaN;
 }
 

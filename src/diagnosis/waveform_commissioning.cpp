@@ -13,7 +13,7 @@
 namespace backlash::diagnosis {
 namespace {
 
-constexpr double kUntold = 0.9;  // of what was known, from which a record tells nothing: choice
+constexpr double kUndetermined = 0.9;  // of what was known, from which a record determines nothing: choice
 constexpr double kFinest =
     0.002;  // of a value, choice: the equations are no better, see kModelError of the fit
 
@@ -115,7 +115,8 @@ double scale_power(const WaveformQuantity& quantity, const WaveformSettings& set
 }
 
 WaveformCommissioning commission_waveform(const std::vector<record::Record>& records,
-                                          const WaveformSettings& settings, double told, double told_error) {
+                                          const WaveformSettings& settings, double known,
+                                          double known_error) {
   WaveformCommissioning result;
   result.machine = settings;
   const std::vector<std::size_t> places = quantities_of(settings);
@@ -125,11 +126,11 @@ WaveformCommissioning commission_waveform(const std::vector<record::Record>& rec
       check_waveform(record, result.machine);
       const bool first = result.states.empty();
       WaveformTask task;
-      if (first) task.half_gap = told / 2, task.log_error = told_error;
+      if (first) task.half_gap = known / 2, task.log_error = known_error;
       const WaveformSolution s = solve_waveform(record, result.machine, task);
       refuse_waveform(s);
       for (std::size_t i = 0; i < places.size(); ++i)
-        left[i] *= s.told[static_cast<std::size_t>(kQuantityPlaces[places[i]])];
+        left[i] *= s.left_of_spread[static_cast<std::size_t>(kQuantityPlaces[places[i]])];
       result.machine = after(result.machine, s);
       result.states.push_back(state_of(s, record.has(record::Channel::motor_position)));
     } catch (const Refusal& refusal) {
@@ -137,7 +138,7 @@ WaveformCommissioning commission_waveform(const std::vector<record::Record>& rec
     }
   }
   for (std::size_t i = 0; i < places.size(); ++i)
-    if (left[i] > kUntold) result.untold.emplace_back(waveform_quantities()[places[i]].name);
+    if (left[i] > kUndetermined) result.undetermined.emplace_back(waveform_quantities()[places[i]].name);
   return result;
 }
 

@@ -318,11 +318,12 @@ class Solver {
     const VectorXd z = total * f.fit.shared;
     s.z.assign(z.data(), z.data() + kGlobalValues);
     s.pull.assign(f.fit.shared.data(), f.fit.shared.data() + kGlobalValues);
-    s.told.assign(kGlobalValues, 1);
-    for (const int k : s.fitted) s.told[std::size_t(k)] = std::min(1.0, std::sqrt(s.covariance(k, k)));
+    s.left_of_spread.assign(kGlobalValues, 1);
+    for (const int k : s.fitted)
+      s.left_of_spread[std::size_t(k)] = std::min(1.0, std::sqrt(s.covariance(k, k)));
     for (int k = 0; k < kGlobalValues; ++k) s.values.push_back(f.value(k));
-    s.log_error =
-        s.priors.shared[kHalfGap].spread * std::max(s.told[kHalfGap], std::min(1.0, std::sqrt(clustered)));
+    s.log_error = s.priors.shared[kHalfGap].spread *
+                  std::max(s.left_of_spread[kHalfGap], std::min(1.0, std::sqrt(clustered)));
     if (data_.position.empty()) s.log_error = std::max(s.log_error, waveform_symmetry_error(s.priors));
     s.prior_cost = f.fit.shared.squaredNorm() - std::pow(f.fit.shared[kHalfGap], 2);
     s.information =

@@ -34,9 +34,9 @@ struct WaveformSolution {
   std::vector<int> fitted;
   double wider = 1;  // -, times which the covariance is that of the fit
   WaveformPriors priors;
-  double finest = kNaN;      // half width of the narrowest interval, in `unit`
-  const char* unit = "m";    // of the gap
-  std::vector<double> told;  // share of the prior spread that the record leaves, per value; 1: tells nothing
+  double finest = kNaN;                // half width of the narrowest interval, in `unit`
+  const char* unit = "m";              // of the gap
+  std::vector<double> left_of_spread;  // share of the prior spread that the record leaves, per value
   WaveformMisfit misfit[kWaveformChannels];
   int windows = 0, left_out = 0;
   bool lacking = false;       // the rig file lacks something of the machine

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How the windows of a fit start, as far as the record and the declared machine tell it beforehand.
+// How the windows of a fit start, as far as the record and the declared machine show it beforehand.
 #pragma once
 
 #include <Eigen/Core>

@@ -13,7 +13,7 @@
 namespace backlash::diagnosis {
 namespace {
 
-constexpr double kLeadRings = 1.3;       // before the reversal: choice, tells the start
+constexpr double kLeadRings = 1.3;       // before the reversal: choice, shows the start
 constexpr double kTailRings = 11.7;      // after it: choice, the motion has died out
 constexpr double kShortestRings = 5;     // of a half period: choice, the first impacts are in it
 constexpr double kSamplesPerRing = 2;    // fewest: theory (Nyquist)

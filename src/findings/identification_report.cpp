@@ -200,7 +200,7 @@ std::string identification_json(const identification::Identification& found, con
   }
   if (found.commissioning) {
     json["common_scale"] = {{"uncertainty", found.commissioning->machine.common_scale}};
-    json["not_told"] = found.commissioning->untold;
+    json["not_told"] = found.commissioning->undetermined;
     for (std::size_t i = 0; i < found.commissioning->states.size(); ++i) {
       const auto& state = found.commissioning->states[i];
       const double half = 2 * state.log_error;

@@ -81,7 +81,7 @@ report::Json machine(const identification::Trace& trace) {
 std::string trace_page(const identification::Trace& trace, const TraceInputs& inputs,
                        const std::string& plots, const std::string& provenance) {
   report::Json data = {{"verdict", to_string(trace.verdict)},
-                       {"has_result", trace.told},
+                       {"has_result", trace.determined},
                        {"message", verdict_sentence(trace)},
                        {"rig", inputs.rig},
                        {"train", joined(inputs.train)},

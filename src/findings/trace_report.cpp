@@ -82,7 +82,7 @@ std::string to_string(identification::TraceVerdict verdict) {
 }
 
 std::string verdict_sentence(const identification::Trace& trace) {
-  if (!trace.told) return "Cannot tell what is missing: " + trace.unexplained->signature + ".";
+  if (!trace.determined) return "Cannot tell what is missing: " + trace.unexplained->signature + ".";
   std::vector<std::string> effects, errors;
   for (const identification::FoundEffect& e : trace.steps) effects.push_back(effect_name(e));
   for (const auto& [name, c] : trace.channels)
@@ -108,7 +108,7 @@ std::string verdict_sentence(const identification::Trace& trace) {
 }
 
 std::string trace_summary(const identification::Trace& trace) {
-  if (!trace.told) return verdict_sentence(trace) + "\n" + remarks(trace);
+  if (!trace.determined) return verdict_sentence(trace) + "\n" + remarks(trace);
   const bool linear = trace.augmented.linear;
   std::string text = verdict_sentence(trace) + "\n\nrelative error on the test record, low-passed at " +
                      to_text(std::round(trace.cutoff * 1000) / 1000) + " Hz\n";

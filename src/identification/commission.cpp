@@ -55,8 +55,8 @@ void warn(Identification& result, const diagnosis::WaveformCommissioning& found,
         "the torque sensor reads {:.3g} times what it should by motor_torque: if the sensor is right, "
         "inertias, stiffnesses, damping and friction are wrong by {:.2g} %, which is part of their errors",
         found.machine.sensor_gain, 100 * doubt));
-  if (!found.untold.empty())
-    result.warnings.push_back("the records do not determine " + joined(found.untold) +
+  if (!found.undetermined.empty())
+    result.warnings.push_back("the records do not determine " + joined(found.undetermined) +
                               ": what the rig file says of it is kept");
   for (const diagnosis::WaveformCommissioning::State& state : found.states)
     if (!state.position) {

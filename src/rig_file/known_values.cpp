@@ -145,7 +145,7 @@ std::string commissioned_text(const RigFile& file, const diagnosis::WaveformComm
     const KnownPlace& place = known_places()[i];
     if (!q.in(found.machine)) continue;
     const char* unit = q.unit_in(found.machine);
-    if (std::count(found.untold.begin(), found.untold.end(), q.name) > 0) continue;
+    if (std::count(found.undetermined.begin(), found.undetermined.end(), q.name) > 0) continue;
     const double whole = found.machine.*q.at, value = whole - shared_inertia(place, file.rig);
     if (q.factor && !(value > 0))
       throw CannotIdentify(

@@ -70,7 +70,7 @@ TEST(KnownValues, WrittenAndReadBack) {
   found.machine.dry_friction = 0.001, found.machine.spread.dry_friction = 0.0002;
   found.machine.sensor_gain = 1.02, found.machine.spread.sensor_gain = 0.005;
   found.machine.common_scale = 0.05;
-  found.untold = {"gear_inertia"};
+  found.undetermined = {"gear_inertia"};
   found.states.push_back({});
   found.states[0].backlash = 5e-5, found.states[0].log_error = 0.06;
   const std::string text = commissioned_text(file, found, "identified from a \"b\".csv");

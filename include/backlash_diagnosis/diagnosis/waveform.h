@@ -52,7 +52,7 @@
 // errors are 1.8 times as large, and 2.9 of them count with position: simulation. Beside it what is left of
 // the position, and what is left of the torque as a twist of the sensor. Where the rig file lacks something,
 // a torque of 7 % of the usual one, typical of such an effect, twists the sensor unseen. Nothing is finer
-// than what equations of rigid flanks can tell (`finest`).
+// than what equations of rigid flanks resolve (`finest`).
 #pragma once
 
 #include <string>
@@ -164,7 +164,7 @@ struct WaveformEvidence {
 ///   below_range        the interval, which is given, holds 0
 Estimate estimate_waveform(const record::Record& record, const WaveformSettings& settings);
 
-/// A value of the machine that records can tell.
+/// A value of the machine that records identify.
 struct WaveformQuantity {
   const char *name, *unit, *words;  ///< key in reports, unit, name in messages
   bool factor;                      ///< its spread is of the logarithm, else in its unit
@@ -183,7 +183,7 @@ const std::vector<WaveformQuantity>& waveform_quantities();
 /// Its power in the factor of the symmetry: that of the contact's stiffness is the exponent.
 double scale_power(const WaveformQuantity& quantity, const WaveformSettings& settings);
 
-/// A machine as records of it tell it.
+/// A machine as records of it identify it.
 struct WaveformCommissioning {
   WaveformSettings machine;  ///< values, their spreads, the scale that they have in common
   struct State {
@@ -193,20 +193,20 @@ struct WaveformCommissioning {
     double residual[2] = {kNaN, kNaN}, noise[2] = {kNaN, kNaN};  ///< of the swing: torque, position
     int windows = 0, left_out = 0;
   };
-  std::vector<State> states;        ///< one per record
-  std::vector<std::string> untold;  ///< names of values of which the records tell nothing
+  std::vector<State> states;              ///< one per record
+  std::vector<std::string> undetermined;  ///< names of values that the records do not determine
 };
 
 /// Fits the machine to records of it in any states: all have the machine's values in common, each has its
 /// backlash, its sensor's bias and its drive's offset. The first record is of the state whose backlash is
-/// `told` (m; NaN: not told) with the standard deviation `told_error` of its logarithm.
+/// `known` (m; NaN: not known) with the standard deviation `known_error` of its logarithm.
 ///
 /// The spreads are no sharper than the fit's covariance C of the logarithms, s^2 u u^T + R:
 ///   s^2 = 1 / (u^T C^-1 u), the most that can be of the direction u of the symmetry
 ///   the values' own: R's diagonal times the largest eigenvalue of R's correlation, so that it holds R
 /// Throws CannotIdentify where a record does not fit, with its name and the reason.
 WaveformCommissioning commission_waveform(const std::vector<record::Record>& records,
-                                          const WaveformSettings& settings, double told = kNaN,
-                                          double told_error = kNaN);
+                                          const WaveformSettings& settings, double known = kNaN,
+                                          double known_error = kNaN);
 
 }  // namespace backlash::diagnosis

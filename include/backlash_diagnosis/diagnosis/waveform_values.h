@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// All values of a machine as one stretch of a record tells them, by the fit of waveform.h: for who compares
+// All values of a machine as one stretch of a record gives them, by the fit of waveform.h: for who compares
 // stretches and asks which value has changed. No value is refused for being far from the declared one.
 #pragma once
 
@@ -32,7 +32,7 @@ struct WaveformValues {
   int windows = 0, left_out = 0;      ///< reversals, and those that the fit does not catch
 };
 
-/// Of the samples from `from` to `to` [s]. Those beside them only tell more finely where a square wave
+/// Of the samples from `from` to `to` [s]. Those beside them only show more finely where a square wave
 /// reverses: a record a few times as long is best. `backlash` > 0 [m], from where the search starts, with the
 /// spread of its logarithm > 0; NaN: nothing is known of it, which takes longer. Throws InvalidParameter for
 /// settings out of range.

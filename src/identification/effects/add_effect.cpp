@@ -37,8 +37,8 @@ std::vector<Candidate> alternatives(const Trial& best, double gain, const std::v
 Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
   const Misfit& left = misfit(before);
   if (nothing_can_be_found(left, context.settings)) return before;
-  context.tell(fmt::format("screening (torque {:.3g}, deflection {:.3g} times the noise floor)", left.torque,
-                           left.deflection));
+  context.report(fmt::format("screening (torque {:.3g}, deflection {:.3g} times the noise floor)",
+                             left.torque, left.deflection));
   const RecordSet& records = before.fitted->records;
   const Trials trials = tried_best(
       before, screen(before.fitted->fit, records, context.range, context.settings.screen), context);

@@ -32,7 +32,7 @@ Hypothesis without_stand_ins(const Hypothesis& named, const SearchContext& conte
 }  // namespace
 
 Hypothesis add_map(const Hypothesis& before, const SearchContext& context) {
-  context.tell("learning maps");
+  context.report("learning maps");
   const SearchSettings& settings = context.settings;
   const double least = settings.asked.least_gain_unclear;
   const RecordSet& records = before.fitted->records;
@@ -67,7 +67,7 @@ Hypothesis add_learned(const Hypothesis& named, const SearchContext& context) {
     return named;
   Hypothesis h = without_stand_ins(named, context);
   const std::size_t count = h.effects.size();
-  h = add_map(h, context);  // one: a machine that is told by several tables is not understood
+  h = add_map(h, context);  // one: a machine that is described by several tables is not understood
   const bool helped = h.effects.size() > count;
   if (helped) h = drop_superfluous(add_effects(h, context), context);
   if (helped && size(h) < (1 - settings.asked.least_gain_unclear) * size(named)) return h;

@@ -237,10 +237,10 @@ std::vector<Eigen::VectorXd> Balance::base(const std::vector<ServoData>& data) c
   return columns;
 }
 
-Eigen::VectorXd Balance::column(const model::Term& term, double telling) const {
+Eigen::VectorXd Balance::column(const model::Term& term, double least_own) const {
   const Eigen::VectorXd change = -weights_.cwiseProduct(rows_of(term));
   Eigen::VectorXd own = change - basis_ * (basis_.transpose() * change);
-  if (!(own.norm() >= telling * change.norm()) || change.norm() == 0) own.setZero();
+  if (!(own.norm() >= least_own * change.norm()) || change.norm() == 0) own.setZero();
   return own;
 }
 

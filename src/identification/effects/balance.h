@@ -31,8 +31,8 @@ class Balance {
   /// units of its standard deviation.
   const Eigen::VectorXd& left() const { return left_; }
   /// Of what a term changes in both sums, in the same units, what the machine cannot explain as well; 0 where
-  /// that is less than `telling` of it.
-  Eigen::VectorXd column(const model::Term& term, double telling) const;
+  /// that is less than `least_own` of it.
+  Eigen::VectorXd column(const model::Term& term, double least_own) const;
 
   /// What columns explain of the channel of which they explain more: relative decreases of the norm of
   /// left().

@@ -32,8 +32,9 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
   const TestGain gain = test_gain(was, is, settings);
   const char* const name = names[deflection];
   if (!(gain.lower > 0))
-    return fmt::format("on the unseen record it lessens the error of {} by {}: not told from nothing", name,
-                       interval(gain));
+    return fmt::format(
+        "on the unseen record it lessens the error of {} by {}: not distinguished from nothing", name,
+        interval(gain));
   const double above = was.total() - was.noise, decrease = was.total() - is.total();
   if (decrease < (map ? settings.least_part_of_map : settings.least_part) * above)
     return fmt::format("on the unseen record it explains {:.2g} % of what {} has above the noise: too little",
@@ -69,7 +70,7 @@ std::vector<std::vector<signal::Measured>> strengths(const Hypothesis& h) {
   return out;
 }
 
-/// How far a delay is beyond what a held torque may be misjudged, and how well the records tell that.
+/// How far a delay is beyond what a held torque may be misjudged, and how well the records show that.
 signal::Measured beyond_hold(const signal::Measured& delay, const SearchContext& context) {
   const double interval = context.data.front().interval, hold = kUnsureOfHold * interval;
   return {std::max(0.0, std::fabs(delay.value) - context.settings.fit.calibration_delay * interval),
@@ -142,7 +143,7 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
 Hypothesis believe(const Hypothesis& before, const ServoData& unseen, const SearchContext& context) {
   Hypothesis h = before;
   while (!h.effects.empty()) {
-    context.tell("asking the unseen record");
+    context.report("asking the unseen record");
     const auto wrong = unbelievable(h, unseen, context);
     if (!wrong) break;
     const std::string id = h.effects[wrong->first].candidate.id;

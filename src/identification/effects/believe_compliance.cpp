@@ -25,7 +25,7 @@ Hypothesis believe_compliance(const Hypothesis& before, const ServoData& unseen,
   const auto fitted =
       std::find_if(all.begin(), all.end(), [&](const FitParameter& p) { return p.name == stiffness.name; });
   if (fitted == all.end()) return before;
-  context.tell("asking the unseen record");
+  context.report("asking the unseen record");
   const FitSettings& settings = context.settings.fit;
   const Hypothesis held = with_held(before, *fitted, kRigid * fitted->get(before.declared->rig));
   const auto rigid = attempted([&] {
@@ -42,7 +42,7 @@ Hypothesis believe_compliance(const Hypothesis& before, const ServoData& unseen,
   Hypothesis h = with_rejected(
       held, "mesh_compliance",
       fmt::format("on the unseen record it lessens the error of deflection by {:.2g} % (95 %: {:.2g} to "
-                  "{:.2g} %): not told from nothing, so the mesh is held stiff",
+                  "{:.2g} %): not distinguished from nothing, so the mesh is held stiff",
                   100 * gain.value, 100 * gain.lower, 100 * gain.upper));
   h.fitted = std::make_shared<const BandFit>(*rigid);
   return h;

@@ -38,7 +38,7 @@ std::string together_not_borne_out(const Hypothesis& h, const Hypothesis& declar
         effect.gain.deflection ? &ServoPrediction::deflection_error : &ServoPrediction::torque_error;
     return (is.*channel).error < (was.*channel).error;
   });
-  if (!better) return "the unseen record is told no better than by the declared machine";
+  if (!better) return "the unseen record is predicted no better than by the declared machine";
   const UnseenSize before(was), after(is);
   const double half = context.settings.revision.half, near_floor = context.settings.acceptance.near_floor;
   if (simulation::load_moves_freely(h.declared->rig) &&

@@ -47,14 +47,14 @@ std::vector<Effect> with_later_shapes(const Effect& effect, const SearchContext&
 Hypothesis with_best_shapes(const Hypothesis& before, const SearchContext& context) {
   Hypothesis best = before;
   for (const Effect& other : with_later_shapes(before.effects.back(), context)) {
-    context.tell("trying more of " + other.candidate.id);
+    context.report("trying more of " + other.candidate.id);
     std::vector<Effect> effects = before.effects;
     effects.back() = other;
     auto with = refitted(before, std::move(effects), context);
     if (with && size(*with) < kWorthMore * size(before) && size(*with) < size(best)) best = std::move(*with);
   }
   for (const Effect& other : with_other_values(before.effects.back(), context)) {
-    context.tell("trying another shape of " + other.candidate.id);
+    context.report("trying another shape of " + other.candidate.id);
     std::vector<Effect> effects = before.effects;
     effects.back() = other;
     auto with = refitted(before, std::move(effects), context);

@@ -209,7 +209,7 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
     rig.terms.push_back(model::make_term(term.id, term.values));
     const Eigen::VectorXd change = records.rows(rig, fit.machine.calibrations) - now;
     Eigen::VectorXd left = orthogonal.of(change);
-    if (left.norm() < settings.telling * change.norm() || change.norm() == 0) left.setZero();
+    if (left.norm() < settings.least_own * change.norm() || change.norm() == 0) left.setZero();
     return left;
   };
   return screen(fit.machine.rig, ResidualOrders(fit, records, orthogonal), range, settings,

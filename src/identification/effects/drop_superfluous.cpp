@@ -50,7 +50,7 @@ Hypothesis drop_superfluous(const Hypothesis& before, const SearchContext& conte
   Hypothesis h = before;
   for (std::size_t i = 0; h.effects.size() > 1 && i < h.effects.size();) {
     const std::string id = h.effects[i].candidate.id;
-    context.tell("doing without " + id);
+    context.report("doing without " + id);
     if (needed(h, i, context)) {
       ++i;
       continue;

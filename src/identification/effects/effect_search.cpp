@@ -123,7 +123,7 @@ void describe_machine(const SearchResult& result, const std::vector<ServoPredict
   trace.rejected = rejected_effects(found);
 }
 
-/// The torque of a machine that is coupled to other axes cannot be told.
+/// The torque of a machine that is coupled to other axes is not known.
 void forget_torque(Trace& trace) {
   const double unknown = std::nan("");
   trace.channels.at("torque") = {unknown, unknown, unknown, unknown, unknown, {}, false};
@@ -132,9 +132,9 @@ void forget_torque(Trace& trace) {
       std::remove_if(all.begin(), all.end(), [](const Independence& i) { return i.channel == "torque"; }),
       all.end());
   trace.notes.emplace_back(
-      "other axes move (gear_train.coupled): cannot tell anything of the torque, which holds their coupling, "
+      "other axes move (gear_train.coupled): nothing can be said of the torque, which holds their coupling, "
       "and no "
-      "effect is sought. The deflection is predicted from the torque that goes through the teeth, and tells "
+      "effect is sought. The deflection is predicted from the torque that goes through the teeth, and shows "
       "the "
       "skew of the encoders");
 }
@@ -227,13 +227,13 @@ void judge_remainder(const std::vector<ChannelRemainder>& all, const Hypothesis&
     trace.verdict = TraceVerdict::unexplained;
 }
 
-/// Where the records serve, and yet do not tell what the machine does.
+/// Where the records serve, and yet do not show what the machine does.
 Trace cannot_tell(const model::Rig& declared, const TraceSettings& asked, const std::string& reason) {
   const double unknown = std::nan("");
   const TraceChannel none = {unknown, unknown, unknown, unknown, unknown, {unknown, unknown, unknown}};
   Trace trace;
   trace.verdict = TraceVerdict::unexplained;
-  trace.told = false;
+  trace.determined = false;
   trace.cutoff = asked.cutoff > 0 ? asked.cutoff : unknown;
   trace.base = trace.augmented = declared;
   trace.channels["torque"] = none;
@@ -258,12 +258,12 @@ double most_left(const Trace& trace, const Hypothesis& found) {
 std::optional<SeveralMachines> several_of(const model::Rig& declared, const Records& records,
                                           const SearchSettings& settings, double left,
                                           const Progress& progress) {
-  const auto tell = [&](const std::string&) {
+  const auto report = [&](const std::string&) {
     if (progress && !progress(1, "fit of each record by itself")) throw Cancelled();
   };
   return contradicting_records(
       declared, records.names, records.test, left,
-      {records.train, motion_range(records.train), settings, tell, [](const auto&) {}});
+      {records.train, motion_range(records.train), settings, report, [](const auto&) {}});
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ void start_in_travel(Machine& machine, const std::vector<ServoData>& data) {
   }
 }
 
-/// The skew of the encoders as the records tell it at once, where that is clear: a start for the fit.
+/// The skew of the encoders as the records show it at once, where that is clear: a start for the fit.
 void start_with_skew(Machine& machine, const std::vector<ServoData>& data) {
   if (!simulation::load_moves_freely(machine.rig)) return;
   double weights = 0, sum = 0;
@@ -58,7 +58,7 @@ std::vector<FitParameter> declared_parameters(const model::Rig& rig) {
     if (!can_be_fitted(declared, rig)) continue;
     FitParameter p = machine_parameter(declared.name, rig);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
-    // With a locked link damping is hardly told and stays where it is.
+    // With a locked link damping is hardly identifiable and stays where it is.
     if (p.positive && declared.is_friction() && !rig.link_locked && !rig.coupled) {
       p.positive = false;
       p.scale = p.get(rig);
@@ -81,10 +81,10 @@ Hypothesis fit_declared(const model::Rig& declared, const SearchContext& context
   if (declared.coupled) machine.priors = rows_as_declared(declared);
   Hypothesis h;
   h.base = std::make_shared<const BandFit>(fit_to_records(
-      context.data, machine, context.settings.fit, [&] { context.tell("fit of the declared machine"); }));
+      context.data, machine, context.settings.fit, [&] { context.report("fit of the declared machine"); }));
   h.declared = std::make_shared<const Machine>(std::move(machine));
   h.fitted = h.base;
-  context.tell_hypothesis(h);
+  context.report_hypothesis(h);
   return h;
 }
 

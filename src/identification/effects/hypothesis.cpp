@@ -131,7 +131,7 @@ std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effe
     for (ParameterValues& values : effect.candidate.terms) values = machine.rig.terms[place++]->values;
   if (!effects.empty()) effects.back().after = std::make_shared<const Machine>(machine);
   other.effects = std::move(effects);
-  context.tell_hypothesis(other);
+  context.report_hypothesis(other);
   return other;
 }
 

@@ -38,13 +38,13 @@ struct Hypothesis {
   std::vector<RejectedEffect> rejected;  // the latest last
 };
 
-/// What all steps read, and whom they tell. `settings.fit` has its bands.
+/// What all steps read, and to whom they report. `settings.fit` has its bands.
 struct SearchContext {
   const std::vector<ServoData>& data;
   model::MotionRange range;
   SearchSettings settings;
-  std::function<void(const std::string& phase)> tell;      // throws Cancelled
-  std::function<void(const Hypothesis&)> tell_hypothesis;  // one that was fitted
+  std::function<void(const std::string& phase)> report;      // throws Cancelled
+  std::function<void(const Hypothesis&)> report_hypothesis;  // one that was fitted
 };
 
 const Misfit& misfit(const Hypothesis& h);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kActsMost = 0.5,
                  kNearlyAll = 0.95;  // choice: of what the effect changes at nearly all samples
-constexpr double kRidge = 1e-10;     // theory: of a squared sensitivity: what these rows do not tell stays
+constexpr double kRidge = 1e-10;     // theory: of a squared sensitivity: what these rows do not show stays
 
 /// Columns of the strengths of all effects, each first of its term's, and which columns are not shapes.
 struct Columns {

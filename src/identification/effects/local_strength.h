@@ -9,7 +9,7 @@
 
 namespace backlash::identification {
 
-/// Strength as told by the samples at which the effect acts most, over that of the whole fit.
+/// Strength as shown by the samples at which the effect acts most, over that of the whole fit.
 struct LocalStrength {
   double ratio = 1, standard_error = 0;
 };

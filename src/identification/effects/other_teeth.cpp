@@ -44,13 +44,13 @@ Hypothesis fitted_with(const model::Rig& teeth, const std::vector<Effect>& effec
   if (!effects.empty()) with_effects = refitted(start, effects, context);
   Hypothesis other = with_effects ? *with_effects : start;
   other.base = std::make_shared<const BandFit>(fit_to_records(
-      context.data, *other.declared, context.settings.fit, [&] { context.tell("trying other teeth"); }));
+      context.data, *other.declared, context.settings.fit, [&] { context.report("trying other teeth"); }));
   other.other_teeth = true;
   if (!with_effects) {
     other.effects.clear();
     other.fitted = other.base;
   }
-  context.tell_hypothesis(other);
+  context.report_hypothesis(other);
   return other;
 }
 
@@ -62,7 +62,7 @@ std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchCont
   // Of the machine without hardening, which has a stiffness of its own.
   const auto teeth = with_hertzian_teeth(h.base->fit.machine.rig, context.range.torque);
   if (!teeth) return std::nullopt;
-  context.tell("trying other teeth");
+  context.report("trying other teeth");
   const auto other = attempted([&] { return fitted_with(*teeth, others, h, context); });
   if (!other || size(*other) >= context.settings.revision.clearly_less * size(h)) return std::nullopt;
   Hypothesis result = *other;

@@ -31,7 +31,9 @@ std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& co
   const AcceptanceSettings& acceptance = settings.acceptance;
   const Balance balance(h.fitted->fit.machine, context.data,
                         {settings.fit.cutoff, settings.fit.rough_cutoff});
-  const auto column = [&](const model::Term& term) { return balance.column(term, settings.screen.telling); };
+  const auto column = [&](const model::Term& term) {
+    return balance.column(term, settings.screen.least_own);
+  };
   std::vector<Plain> all;
   const MachineFit& fit = h.fitted->fit;
   const OrthogonalPart left(fit, Eigen::Index(h.fitted->records.layout().size()));
@@ -132,7 +134,7 @@ std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain
 
 Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context) {
   if (!simulation::load_moves_freely(h.declared->rig)) return h;
-  context.tell("looking at the balance of torques and at the pressed flanks");
+  context.report("looking at the balance of torques and at the pressed flanks");
   const std::vector<Plain> plain = plain_candidates(h, context);
   if (plain.empty()) return h;
   const auto with = with_best(h, plain, context);

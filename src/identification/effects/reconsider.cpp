@@ -10,7 +10,7 @@ Hypothesis reconsider(const Hypothesis& before, const SearchContext& context) {
   for (std::size_t i = 0; h.effects.size() > 1 && i < h.effects.size();) {
     if (clearly_right(misfit(h), context)) return h;
     const std::string id = h.effects[i].candidate.id;
-    context.tell("reconsidering " + id);
+    context.report("reconsidering " + id);
     const Hypothesis other = drop_superfluous(add_effects(without_effect(h, i, context), context), context);
     if (size(other) < context.settings.revision.clearly_less * size(h)) {
       h = with_rejected(

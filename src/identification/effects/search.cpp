@@ -13,8 +13,8 @@
 namespace backlash::identification {
 namespace {
 
-/// What is told on the way: a share that never falls back when effects are taken out again, and the best so
-/// far.
+/// What is reported on the way: a share that never falls back when effects are taken out again, and the best
+/// so far.
 class SearchProgress {
  public:
   SearchProgress(const SearchSettings& settings, const Progress& progress)
@@ -56,7 +56,7 @@ Hypothesis believe_physical(const Hypothesis& before, const ServoData& unseen, c
   }
 }
 
-/// Together, and with friction held at zero, they may tell less than each did.
+/// Together, and with friction held at zero, they may explain less than each did.
 Hypothesis believe_all(const Hypothesis& before, const Hypothesis& declared, const ServoData& unseen,
                        const SearchContext& context) {
   const Hypothesis h = believe_physical(before, unseen, context),
@@ -98,11 +98,11 @@ std::optional<Hypothesis> plain_effects(const Hypothesis& declared, const ServoD
 SearchResult search_effects(const model::Rig& declared, const std::vector<ServoData>& data,
                             const ServoData& unseen, const SearchSettings& settings,
                             const Progress& progress) {
-  SearchProgress told(settings, progress);
-  const Interruption interruption([&] { return told.goes_on(); });  // fits of minutes end when asked to
+  SearchProgress reported(settings, progress);
+  const Interruption interruption([&] { return reported.goes_on(); });  // fits of minutes end when asked to
   const SearchContext context{data, motion_range(data), settings,
-                              [&](const std::string& p) { told.phase(p); },
-                              [&](const Hypothesis& h) { told.hypothesis(h); }};
+                              [&](const std::string& p) { reported.phase(p); },
+                              [&](const Hypothesis& h) { reported.hypothesis(h); }};
   SearchResult result{fit_declared(declared, context), {}};
   if (declared.coupled) {
     result.found = believe_compliance(result.declared, unseen, context);

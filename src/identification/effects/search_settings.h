@@ -16,7 +16,7 @@ namespace backlash::identification {
 struct ScreenSettings {
   double probe =
       0.02;  // theory: of a strength that shows clearly, for differences above the noise of the simulation
-  double telling =
+  double least_own =
       1e-3;  // theory: of a sensitivity, to be left after what the machine's own parameters explain
   std::size_t peaks = 4;  // choice (time): of the spectrum of the residual, orders that are tried
 };
@@ -59,7 +59,7 @@ struct RevisionSettings {
 struct MapSettings {
   double something_left = 1.25;  // simulation: times the floor
   std::size_t trials = 2;        // choice (time): maps that are fitted with the machine
-  std::size_t nearest = 3;       // choice: named effects that are told beside a map
+  std::size_t nearest = 3;       // choice: named effects that are reported beside a map
   double probe = 0.05;           // theory: of a strength that shows clearly, as ScreenSettings::probe
   double tail = 0.002;           // choice: of the samples, beyond the outer points
   double ridge = 1e-6;           // theory: of the mean squared sensitivity: decides what nothing else does
@@ -86,10 +86,11 @@ struct BeliefSettings {
   double much_worse = 0.15;  // choice: of the other channel's error, at no price
   double least_z = 4;        // choice: of a strength, standard errors
   double least_local = 0.5;  // choice: of a strength, where the effect acts most: less is another effect
-  double local_error = 0.1;  // choice: of a strength; where it is told worse the rest of the record counts
-  double sure = 2;           // theory: standard errors, 95 %
+  double local_error =
+      0.1;          // choice: of a strength; where it is known less well the rest of the record counts
+  double sure = 2;  // theory: standard errors, 95 %
   // Where more is left than so many times the noise: of a strength, in a part of the records that holds this
-  // share of what the effect does, and tells it within this error: as far off, by so many standard errors, is
+  // share of what the effect does, and shows it within this error: as far off, by so many standard errors, is
   // another effect. Choices.
   double beyond_noise = 2, least_constant = 0.5, least_share = 0.1, part_error = 0.3, clearly = 3;
 };
@@ -101,7 +102,7 @@ struct ExplainableSettings {
       knots_of_time = 6;            // choice: of a function of one state, of two, of time
   std::size_t orders = 4;           // choice: waves over the position
   std::size_t most_samples = 6000;  // choice (time)
-  std::size_t least_samples = 200;  // choice: fewer tell nothing
+  std::size_t least_samples = 200;  // choice: fewer show nothing
   double near_zero = 0.1;           // choice: share of a residual: less is nothing that matters
   double worth_saying = 0.01;  // choice: of the signal: what is smaller lies within what any model neglects
   double far = 10, worth_saying_far = 0.001;  // simulation: the same, of what is so many times the floor

@@ -27,7 +27,7 @@ bool beyond_noise(const Remainder& r, const ExplainableSettings& settings) {
 }
 
 /// Well above the noise of the sensors the whole remainder is the model's lack, of which the states need show
-/// but a part; else only what they show can be told from noise.
+/// but a part; else only what they show can be distinguished from noise.
 bool explainable(const Remainder& r, const ExplainableSettings& settings) {
   const double part = beyond_noise(r, settings) ? 1 : std::sqrt(r.explainable.value);
   return r.explainable.value >= settings.near_zero && r.explainable.lower > 0 &&

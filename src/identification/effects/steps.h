@@ -10,7 +10,7 @@ namespace backlash::identification {
 
 /// The declared machine, fitted. Friction may come out below 0 here: the machine may lack an effect.
 Hypothesis fit_declared(const model::Rig& declared, const SearchContext& context);
-/// The parameters that the rig declares and such records can tell.
+/// The parameters that the rig declares and such records identify.
 std::vector<FitParameter> declared_parameters(const model::Rig& rig);
 
 /// Of a term that every machine has some of, the largest strength that is usual (model/term.h); 0: none is.
@@ -63,7 +63,7 @@ Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
 /// error.
 Hypothesis believe(const Hypothesis& h, const ServoData& unseen, const SearchContext& context);
 
-/// The declared machine without effects where those that are believed one by one do not tell more of the
+/// The declared machine without effects where those that are believed one by one do not explain more of the
 /// unseen record together.
 Hypothesis believe_together(const Hypothesis& h, const Hypothesis& declared, const ServoData& unseen,
                             const SearchContext& context);

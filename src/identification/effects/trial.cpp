@@ -83,7 +83,7 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
                              c.gain < worth ? "too little" : "others by more")});
       continue;
     }
-    context.tell(fmt::format("trying {} (predicted gain {:.3g})", c.id, c.gain));
+    context.report(fmt::format("trying {} (predicted gain {:.3g})", c.id, c.gain));
     if (auto trial = tried(h, c, context))
       all.fitted.push_back(with_free_orders(h, *trial, context));
     else
@@ -109,7 +109,7 @@ Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchCont
     return trial;
   Candidate free = trial.candidate;
   free.held_orders.clear();
-  context.tell("fitting the order of " + free.id);
+  context.report("fitting the order of " + free.id);
   const auto fitted = tried(h, free, context, trial.residual);
   if (!fitted) return trial;
   Trial best = trial;

@@ -44,7 +44,7 @@ Hypothesis try_equivalents(const Hypothesis& before, const SearchContext& contex
     const std::vector<Candidate> alternatives = h.effects[i].alternatives;
     for (const Candidate& other : alternatives) {
       const std::string id = h.effects[i].candidate.id;
-      context.tell("trying " + other.id + " instead of " + id);
+      context.report("trying " + other.id + " instead of " + id);
       auto with = refitted(h, swapped(h.effects, i, other.id), context);
       if (!with) continue;
       const Hypothesis revised = with_simpler(drop_superfluous(*with, context), id, other.id, context);

@@ -49,7 +49,7 @@ Hypothesis add_shape_of_friction(const Hypothesis& before, const SearchContext& 
   for (const model::TermType& type : model::term_types()) {
     if (!type.shapes_friction || !(usual_strength(type, rig) > 0)) continue;
     for (const Candidate& candidate : usual_candidates(type, rig, context.range)) {
-      context.tell("fit of how friction builds up");
+      context.report("fit of how friction builds up");
       std::vector<Effect> effects = h.effects;
       effects.push_back({candidate, {}, {}, {}, {}});
       auto with = refitted(h, std::move(effects), context);

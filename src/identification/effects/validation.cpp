@@ -10,8 +10,8 @@ namespace backlash::identification {
 namespace {
 
 constexpr double kRidge = 1e-10;  // theory: of a squared sensitivity
-constexpr double kTold =
-    0.05;  // choice: of a squared sensitivity; what the other rows hardly tell stays where it is
+constexpr double kShown =
+    0.05;  // choice: of a squared sensitivity; what the other rows hardly show stays where it is
 
 constexpr double kDampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1};  // choice: of a squared sensitivity
 constexpr double kNoWorse = 1.02;  // choice: of a sum of squares, what is lost to a linear step
@@ -37,7 +37,7 @@ Eigen::VectorXd without(const signal::LeastSquaresFit& fit, const Eigen::MatrixX
   Eigen::MatrixXd rest = unit.asDiagonal() * (normal - signal::gram(j)) * unit.asDiagonal();
   Eigen::VectorXd gradient = unit.asDiagonal() * (j.transpose() * fit.residuals(rows));
   for (Eigen::Index i = 0; i < rest.rows(); ++i) {
-    if (rest(i, i) >= kTold) continue;
+    if (rest(i, i) >= kShown) continue;
     rest.row(i).setZero();
     rest.col(i).setZero();
     rest(i, i) = 1;

@@ -122,7 +122,7 @@ enum class TraceVerdict { effect_found, nothing_missing, unexplained };
 
 struct Trace {
   TraceVerdict verdict = TraceVerdict::nothing_missing;
-  bool told = true;            // false: the records do not tell the machine, and nothing is known
+  bool determined = true;      // false: the records do not determine the machine, and nothing is known
   double cutoff = 0;           // Hz
   model::Rig base, augmented;  // fitted, load side
   std::map<std::string, signal::Measured> base_parameters,
@@ -139,8 +139,8 @@ struct Trace {
   TraceSeries series;
 };
 
-/// `told` is false where the records serve and do not tell the declared machine. Throws CannotIdentify for
-/// a rig or records that this cannot be done with, BadData, Cancelled.
+/// `determined` is false where the records serve and do not determine the declared machine. Throws
+/// CannotIdentify for a rig or records that this cannot be done with, BadData, Cancelled.
 Trace trace_residual(const model::Rig& declared, const std::vector<record::Record>& train,
                      const record::Record& test, const TraceSettings& settings = {},
                      const Progress& progress = nullptr);
