@@ -47,7 +47,6 @@ void put_what_it_has(const WaveformSettings& s, const WaveformData& data, Wavefo
   put(p, kLinkInertia, s.link_inertia, s.spread.link_inertia, true);
   put(p, kLinkDamping, s.link_damping, s.spread.link_damping, true);
   put(p, kLinkFriction, s.link_friction, friction_spread(s.spread.link_friction, data), false);
-  put(p, kTeethHysteresis, 0, kHysteresis, false);
 }
 
 void put_what_it_lacks(const WaveformData& data, bool lacking, WaveformPriors& p) {
@@ -140,6 +139,7 @@ WaveformPriors waveform_priors(const WaveformSettings& s, const WaveformData& da
   put(p, kDriveSlope, 0, moves ? 0 : Spread::kDriveSlope * data.level, false);
   put(p, kPositionZero, seen && !moves ? signal::median(data.position) : 0,
       seen && !moves ? waveform_swing(data.position) : 0, false);
+  put(p, kTeethHysteresis, 0, lacking || !seen ? kHysteresis : 0, false);
   put_what_it_lacks(data, lacking, p);
   p.shared[kCommonScale] = {"common scale", 1, s.common_scale, true};
   p.powers[kHalfGap] = -1;

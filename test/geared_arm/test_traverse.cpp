@@ -147,7 +147,7 @@ TEST(ArmTraverse, WhatIsMissingIsSaid) {
   EXPECT_EQ(found[0].estimate.status, Status::insufficient_data);
   EXPECT_NE(found[0].estimate.message.find("needs load_position, or gear.contact"), std::string::npos);
   EXPECT_EQ(found[1].estimate.status, Status::insufficient_data);
-  EXPECT_NE(found[1].estimate.message.find("does not resolve the cycle"), std::string::npos);
+  EXPECT_NE(found[1].estimate.message.find("do not resolve the cycle"), std::string::npos);
 }
 
 }  // namespace

@@ -171,7 +171,7 @@ TEST(JointWatch, SaysWhyThereIsNoAnswer) {
   EXPECT_NE(Robot(sensor).watch.state().why_not.find("being learned"), std::string::npos);
   WatchSettings locked = settings(folder);
   locked.joint.rig = rig_file::load_rig_file(BACKLASH_DIAGNOSIS_SOURCE_DIR "/config/cycloidal.yaml");
-  EXPECT_NE(Robot(locked).watch.state().why_not.find("does not declare"), std::string::npos);
+  EXPECT_NE(Robot(locked).watch.state().why_not.find("declares neither"), std::string::npos);
   WatchSettings missing = settings(folder);
   missing.healthy = {"/nowhere/monday.csv"};
   EXPECT_THROW(JointWatch{missing}, MissingInput);

@@ -103,10 +103,10 @@ TEST(Waveform, MachinesWithAllValuesOff) {
     const Estimate alone = diagnosis::estimate_waveform(without_position(record), declared());
     expect_holds(alone, backlash);
     EXPECT_NE(alone.message.find("limited by the declared stiffness"), std::string::npos) << alone.message;
-    // By theory 2.3 / sqrt(information of the priors on the scale) at least: 14 %; of 25 um +-0.6 um beside
-    // it.
+    // By theory 2.3 / sqrt(information of the priors on the scale) at least: 14 %, and more as the hysteresis
+    // of the teeth is not known; of 25 um +-0.6 um beside it.
     EXPECT_GT(alone.upper - alone.lower, 0.2 * alone.backlash);
-    EXPECT_LT(alone.upper - alone.lower, 0.34 * alone.backlash);
+    EXPECT_LT(alone.upper - alone.lower, 0.36 * alone.backlash);
   }
 }
 
@@ -338,8 +338,9 @@ TEST(Waveform, CommissionedWhenNewFromTorqueAlone) {
       diagnosis::estimate_waveform(without_position(record_of(drawn(31, worn))), commissioned.machine);
   expect_holds(absolute, worn);
   EXPECT_NEAR(absolute.backlash, worn, 0.02 * worn);
-  // 2.3 errors to either side, of 1 % that is known of the first play and as much of the values beside it.
-  EXPECT_LT(absolute.upper - absolute.lower, 0.09 * worn);
+  // 2.3 errors to either side, of 1 % that is known of the first play and as much of the values beside it,
+  // among them the hysteresis of the teeth.
+  EXPECT_LT(absolute.upper - absolute.lower, 0.095 * worn);
 }
 
 TEST(Waveform, CommissionedFromTwoStates) {

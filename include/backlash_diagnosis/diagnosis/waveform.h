@@ -17,8 +17,8 @@
 // say them is a choice: what data sheets and drawings are good for.
 //
 // The exponent n is as declared; alpha or c may be absent. No rig file has the hysteresis h of the teeth: all
-// teeth have some per cent, and without it torque alone shows too large a play. A mesh of angles has rb = 1:
-// d in rad, F in N m.
+// teeth have some per cent, and without it torque alone shows too large a play; an angle does not need it. A
+// mesh of angles has rb = 1: d in rad, F in N m.
 //
 // Symmetry of torque alone: with inertias, damping and stiffnesses times s, the contact's K times s^n and its
 // alpha and c times s, and the backlash divided by s, the torque is the same. From torque alone the play is
