@@ -114,18 +114,20 @@ void look_at_held(RecordLook& look, ChannelState& state) {
 }
 
 /// The held position with the fewest new values; null: none. A torque may be held by the drive itself, and is
-/// then what it says all the time; a position is not.
-const ChannelState* slowest_held(const std::vector<ChannelState>& channels) {
+/// then what it says all the time; a position is not. Values of a coarse encoder repeat as well, and not
+/// equally long.
+const ChannelState* slowest_held(const RecordLook& look) {
   const ChannelState* slowest = nullptr;
-  for (const ChannelState& state : channels)
-    if (state.held >= kHeld && is_smooth(state.channel) && (!slowest || state.held > slowest->held))
+  for (const ChannelState& state : look.out.channels)
+    if (state.held >= kHeld && is_smooth(state.channel) && (!slowest || state.held > slowest->held) &&
+        held_regularly(look.record.column(state.channel)) >= kHeld)
       slowest = &state;
   return slowest;
 }
 
 /// Rows of new values remain, where the other held channels are new in them too.
 void leave_out_held(RecordLook& look) {
-  const ChannelState* slowest = slowest_held(look.out.channels);
+  const ChannelState* slowest = slowest_held(look);
   if (!slowest || look.declared.shares_stamps) return;
   const std::vector<bool> rows = new_values(look.record.column(slowest->channel), 1 / (1 - slowest->held));
   for (const ChannelState& state : look.out.channels)
