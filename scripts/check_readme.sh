@@ -1,6 +1,6 @@
 #!/bin/bash
 # Pastes every command under "First questions" of the README in an empty folder, one after the other and without a wait of its
-# own, on a machine without a master, and looks for the answers that the README quotes, their figures left out.
+# own, on a machine without a master, and looks for the answers that the README quotes, their figures within a tenth.
 # Exit codes 0 to 3 of a command are answers. Usage: bash scripts/check_readme.sh
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
@@ -65,17 +65,24 @@ python3 - "${REPO}/README.md" answers.txt <<'END' || fail "an answer is not the 
 import re
 import sys
 
-def words(text):  # YAML folds long strings; of a live node and of another processor the last figures differ
-    return " ".join(re.sub(r"\d[\d.]*(e-?\d+)?", "0", re.sub(r"\\\n\s*\\?", "", text)).split())
+NUMBER = r"\d[\d.]*(?:e-?\d+)?"
+
+def words(text):  # YAML folds long strings
+    return " ".join(re.sub(r"\\\n\s*\\?", "", text).split())
+
+def is_given(quote, text):  # a live node answers from other samples, another processor rounds otherwise
+    figures = [float(figure.rstrip(".")) for figure in re.findall(NUMBER, quote)]
+    pattern = f"({NUMBER})".join(re.escape(part) for part in re.split(NUMBER, quote))
+    return any(all(abs(float(given.rstrip(".")) - figure) <= 0.1 * abs(figure) for given, figure in zip(found.groups(), figures))
+               for found in re.finditer(pattern, text))
 
 page, said = (open(name).read() for name in sys.argv[1:])
 quotes = re.findall(r"(?:^>.*\n)+", page, re.MULTILINE)
-given = [words(said)] + [words(line) for line in said.splitlines()]
 missing = []
 for quote in quotes:
     lines = [line[1:] for line in quote.splitlines()]
     parts = lines if lines[0].startswith("     ") else [" ".join(lines)]  # a piece of a table, or a sentence
-    missing += [part for part in parts if not any(words(part) in line for line in given)]
+    missing += [part for part in parts if not is_given(words(part), words(said))]
 print(f"{len(quotes)} quoted answers, {len(missing)} not given", *missing, sep="\n")
 sys.exit(bool(missing) or len(quotes) < 5)
 END

@@ -120,7 +120,7 @@ std::vector<ContradictedValue> contradicted(const WaveformSolution& s, const Wav
 /// What is left, and which of what a file may lack takes most.
 std::string lacking_text(const WaveformSolution& s) {
   std::string text;
-  for (std::size_t k = kStribeck; k < kGlobalValues; ++k)
+  for (std::size_t k = s.position() ? kTeethHysteresis : kStribeck; k < kGlobalValues; ++k)
     if (std::fabs(s.z[k]) > kBeyondSpread && std::fabs(s.z[k]) > kErrorsFar * s.left_of_spread[k])
       text += fmt::format("{} {:.2g}, ", waveform_value_name(static_cast<int>(k)), s.values[k]);
   text += fmt::format("{:.2g} % of the torque",

@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kMoves = 2;      // theory: steps of the sensor per sample, at which no value repeats
 constexpr double kMakesUp = 0.5;  // choice: of the way in as many samples again, that one step makes
+constexpr double kRests = 3;      // choice: times the usual number of samples that a value lasts
 constexpr double kHeld = 0.25;    // choice: share of samples; what rounds and rests shows up to 0.1
 constexpr std::size_t kFewestMoving = 200;  // choice: samples of motion, to say a share
 constexpr std::size_t kFewestLevels = 20;   // choice: values of a torque that is measured and not switched
@@ -42,18 +43,23 @@ std::vector<Run> runs_of(const std::vector<double>& x, std::size_t least) {
 }
 
 /// Share of the samples in motion that repeat the one before. A value that was held is followed by a step
-/// that makes up for it; one of a machine that stood still, by the first of a motion.
+/// that makes up for it; one of a machine that stood still, by the first of a motion, and it lasts longer.
 double held_while_moving(const std::vector<double>& x, double step) {
-  std::size_t fresh = 0, held = 0;
+  std::vector<double> lengths, held;
   for (const Run& run : runs_of(x, 1)) {
     const std::size_t length = run.end - run.begin;
     if (run.end + length >= x.size()) break;
     const double next = std::fabs(x[run.end] - x[run.end - 1]);
     if (next <= kMoves * step || x[run.begin] == 0) continue;  // a speed of 0 is one of a machine at rest
-    ++fresh;
-    if (next >= kMakesUp * std::fabs(x[run.end + length] - x[run.end])) held += length - 1;
+    lengths.push_back(double(length));
+    if (next >= kMakesUp * std::fabs(x[run.end + length] - x[run.end])) held.push_back(double(length));
   }
-  return fresh + held < kFewestMoving ? 0 : double(held) / double(fresh + held);
+  if (lengths.empty()) return 0;
+  const double fresh = double(lengths.size()), longest = kRests * signal::median(lengths);
+  double repeated = 0;
+  for (const double length : held)
+    if (length <= longest) repeated += length - 1;
+  return fresh + repeated < double(kFewestMoving) ? 0 : repeated / (fresh + repeated);
 }
 
 /// The same of a torque, whose values may well repeat where it is switched or rounded: held, each lasts
@@ -114,20 +120,18 @@ void look_at_held(RecordLook& look, ChannelState& state) {
 }
 
 /// The held position with the fewest new values; null: none. A torque may be held by the drive itself, and is
-/// then what it says all the time; a position is not. Values of a coarse encoder repeat as well, and not
-/// equally long.
-const ChannelState* slowest_held(const RecordLook& look) {
+/// then what it says all the time; a position is not.
+const ChannelState* slowest_held(const std::vector<ChannelState>& channels) {
   const ChannelState* slowest = nullptr;
-  for (const ChannelState& state : look.out.channels)
-    if (state.held >= kHeld && is_smooth(state.channel) && (!slowest || state.held > slowest->held) &&
-        held_regularly(look.record.column(state.channel)) >= kHeld)
+  for (const ChannelState& state : channels)
+    if (state.held >= kHeld && is_smooth(state.channel) && (!slowest || state.held > slowest->held))
       slowest = &state;
   return slowest;
 }
 
 /// Rows of new values remain, where the other held channels are new in them too.
 void leave_out_held(RecordLook& look) {
-  const ChannelState* slowest = slowest_held(look);
+  const ChannelState* slowest = slowest_held(look.out.channels);
   if (!slowest || look.declared.shares_stamps) return;
   const std::vector<bool> rows = new_values(look.record.column(slowest->channel), 1 / (1 - slowest->held));
   for (const ChannelState& state : look.out.channels)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "backlash_diagnosis/record/even_grid.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "check_parts.h"
@@ -19,15 +20,6 @@ constexpr double kClearlyBetter =
 constexpr double kOnGrid = 0.5;  // theory: of an interval, beyond which a stamp is nearer to another row
 constexpr double kSteady = 0.2;  // choice: of the speed, by which it may change across a step of the clock
 constexpr double kClearMotion = 20;  // choice: steps of the sensor that a speed must pass to be one
-
-/// Samples missing between i and i + 1: a late sample is followed by a short interval, a lost one is not.
-std::size_t missing_after(const std::vector<double>& time, std::size_t i, double interval) {
-  const double own = (time[i + 1] - time[i]) / interval;
-  if (own < 1 + kMissing) return 0;
-  const std::size_t first = i > 0 ? i - 1 : i, last = std::min(i + 2, time.size() - 1);
-  const double around = (time[last] - time[first]) / interval - double(last - first);
-  return around < kMissing ? 0 : std::size_t(std::lround(std::min(own - 1, around)));
-}
 
 /// The clock jumped between i and i + 1 by more than the motion did: the speed before and after, being the
 /// same, covers the way in one interval.
@@ -65,14 +57,6 @@ std::string describe(const Lost& lost, const std::vector<double>& time) {
              lost.places, time[lost.first], lost.most, time[lost.most_after]);
 }
 
-/// Rows of an even grid that the samples stand on, counted from the first.
-std::vector<double> rows_of(const std::vector<double>& time, double interval) {
-  std::vector<double> rows(time.size(), 0);
-  for (std::size_t i = 0; i + 1 < time.size(); ++i)
-    rows[i + 1] = rows[i] + 1 + double(missing_after(time, i, interval));
-  return rows;
-}
-
 /// Which stamps the motion follows: on a straight line from neighbour to neighbour the position leaves less
 /// with the times at which it was sampled than with others.
 bool samples_are_even(const RecordLook& look) {
@@ -93,12 +77,12 @@ bool samples_are_even(const RecordLook& look) {
   return false;
 }
 
-void look_at_jitter(RecordLook& look) {
+void look_at_jitter(RecordLook& look, const std::vector<std::size_t>& rows) {
   std::vector<double>& t = look.record.time;
   double squares = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i + 1 < t.size(); ++i) {
-    if (missing_after(t, i, look.interval) > 0) continue;
+    if (rows[i + 1] - rows[i] > 1) continue;
     squares += std::pow((t[i + 1] - t[i]) / look.interval - 1, 2);
     ++count;
   }
@@ -106,19 +90,18 @@ void look_at_jitter(RecordLook& look) {
   if (look.out.stamps.jitter < kJitters || !samples_are_even(look)) return;
   look.out.stamps.of_stamps_only = true;
   if (look.declared.shares_stamps) return;
-  const std::vector<double> rows = rows_of(t, look.interval);
   const double n = double(t.size()), mean_row = std::accumulate(rows.begin(), rows.end(), 0.0) / n,
                mean_time = std::accumulate(t.begin(), t.end(), 0.0) / n;
   double along = 0, square = 0, furthest = 0;
   for (std::size_t i = 0; i < t.size(); ++i) {
-    along += (rows[i] - mean_row) * (t[i] - mean_time);
-    square += (rows[i] - mean_row) * (rows[i] - mean_row);
+    along += (double(rows[i]) - mean_row) * (t[i] - mean_time);
+    square += std::pow(double(rows[i]) - mean_row, 2);
   }
   const double interval = along / square;
   for (std::size_t i = 0; i < t.size(); ++i)
-    furthest = std::max(furthest, std::fabs(t[i] - mean_time - interval * (rows[i] - mean_row)));
+    furthest = std::max(furthest, std::fabs(t[i] - mean_time - interval * (double(rows[i]) - mean_row)));
   if (furthest > kOnGrid * interval) return;  // a clock that drifts: stamps stay as they are
-  for (std::size_t i = 0; i < t.size(); ++i) t[i] = mean_time + interval * (rows[i] - mean_row);
+  for (std::size_t i = 0; i < t.size(); ++i) t[i] = mean_time + interval * (double(rows[i]) - mean_row);
   look.out.stamps.evened = true;
 }
 
@@ -130,9 +113,10 @@ std::string counted(std::size_t count, const std::string& noun) {
 
 void check_stamps(RecordLook& look) {
   const std::vector<double>& time = look.record.time;
+  const std::vector<std::size_t> rows = rows_of_samples(time, look.interval);
   Lost lost;
   for (std::size_t i = 0; i + 1 < time.size(); ++i) {
-    const std::size_t missing = missing_after(time, i, look.interval);
+    const std::size_t missing = rows[i + 1] - rows[i] - 1;
     if (missing == 0) continue;
     if (is_clock_step(look, i)) {
       look.say(
@@ -161,7 +145,7 @@ void check_stamps(RecordLook& look) {
              look.record.first_repeated_stamp, look.record.repeated_stamps, Consequence::mended,
              fmt::format("{} repeated, the first at {:.6g} s: the later samples are left out",
                          counted(look.record.repeated_stamps, "stamp"), look.record.first_repeated_stamp));
-  look_at_jitter(look);
+  look_at_jitter(look, rows);
 }
 
 }  // namespace backlash::record

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "backlash_diagnosis/signal/order_statistics.h"
+
 namespace backlash::record {
 double interpolated(const std::vector<double>& time, const std::vector<double>& y, std::size_t j, double t,
                     bool cubic) {
@@ -27,6 +29,25 @@ constexpr double kEven =
     1e-3;  // of an interval, off which a stamp moves no sample: choice, far below any jitter
 constexpr double kFarStep = 1e6;  // intervals, of one step: no record of such a gap is one
 
+constexpr double kLong =
+    1.3;  // theory: intervals; under jitter of 20 % one in 200 with a lost sample is shorter
+constexpr double kSurely = 1.75;    // the same: one in 200 without is longer
+constexpr std::size_t kAround = 5;  // choice: samples on each side of a long interval
+
+/// Samples missing between i and i + 1, of which the rows are known up to i.
+std::size_t missing_after(const std::vector<double>& time, const std::vector<std::size_t>& rows,
+                          std::size_t i, double interval) {
+  if (time[i + 1] - time[i] < kLong * interval) return 0;
+  std::vector<double> before, after;
+  for (std::size_t k = i + 1; k-- > 0 && before.size() < kAround;)
+    before.push_back(time[k] / interval + double(rows[i] - rows[k]));
+  for (std::size_t k = i + 1; k < time.size() && after.size() < kAround; ++k) {
+    if (!after.empty() && time[k] - time[k - 1] >= kSurely * interval) break;
+    after.push_back(time[k] / interval - double(k - i - 1));
+  }
+  return std::size_t(std::max(0.0, std::round(signal::median(after) - signal::median(before)) - 1));
+}
+
 struct Grid {
   std::vector<double> time;      // s, of the rows
   std::vector<bool> lost;        // of each row
@@ -37,12 +58,9 @@ struct Grid {
 /// Samples count on from one another: a clock that drifts against the median interval does not add up.
 std::optional<Grid> grid_of(const std::vector<double>& time, double median) {
   Grid g;
-  g.row.push_back(0);
-  for (std::size_t i = 1; i < time.size(); ++i) {
-    const double steps = std::round((time[i] - time[i - 1]) / median);
-    if (!(steps < kFarStep)) return {};
-    g.row.push_back(g.row.back() + static_cast<std::size_t>(std::max(1.0, steps)));
-  }
+  for (std::size_t i = 1; i < time.size(); ++i)
+    if (!((time[i] - time[i - 1]) / median < kFarStep)) return {};
+  g.row = rows_of_samples(time, median);
   const std::size_t rows = g.row.back() + 1;
   if (rows > 2 * time.size()) return {};
   const double interval = (time.back() - time.front()) / static_cast<double>(rows - 1);
@@ -93,6 +111,13 @@ std::vector<double> sampled_at(const Record& record, const Grid& g) {
 }
 
 }  // namespace
+
+std::vector<std::size_t> rows_of_samples(const std::vector<double>& time, double interval) {
+  std::vector<std::size_t> rows = {0};
+  for (std::size_t i = 0; i + 1 < time.size(); ++i)
+    rows.push_back(rows[i] + 1 + missing_after(time, rows, i, interval));
+  return rows;
+}
 
 bool is_smooth(Channel channel) {
   return channel == Channel::motor_position || channel == Channel::load_position ||

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -32,6 +33,32 @@ TEST(EvenGrid, GivesLostSamplesTheirRows) {
   EXPECT_TRUE(even.whole(5, 2));
   EXPECT_FALSE(even.whole(5, 3));
   EXPECT_TRUE(even.whole(3, 0));
+}
+
+// An interval alone does not show whether the sample after it is late or one before it was lost: jitter of a
+// tenth (a fifth) of an interval makes one of 2500 (13) half as long again, or half as short.
+TEST(EvenGrid, LateSamplesAreNotLost) {
+  for (const double jitter : {0.1, 0.2}) {
+    Random random(7);
+    std::vector<double> times;
+    std::vector<std::size_t> rows;
+    for (std::size_t row = 0; row < 20000; ++row) {
+      if (row > 0 && random.uniform() < 0.005) continue;
+      times.push_back(double(row) + std::clamp(jitter * random.normal(), -0.49, 0.49));
+      rows.push_back(row);
+    }
+    const std::vector<std::size_t> found = rows_of_samples(times, 1);
+    std::size_t differ = 0, rounded = 0;
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      const std::size_t apart = rows[i] - rows[i - 1];
+      differ += found[i] - found[i - 1] != apart;
+      rounded += std::size_t(std::max(1.0, std::round(times[i] - times[i - 1]))) != apart;
+    }
+    EXPECT_LT(differ, rounded) << jitter;
+    // A row too many moves all samples behind it: by simulation none at a tenth, nine at a fifth; by rounding
+    // 6, 748.
+    EXPECT_NEAR(double(found.back()), double(rows.back()), jitter > 0.1 ? 12 : 0) << jitter;
+  }
 }
 
 // A cubic is its own interpolation, but beside the ends, where it is a line; a torque that jumps does not

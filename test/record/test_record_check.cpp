@@ -242,6 +242,20 @@ TEST(RecordCheck, SaysHowOftenAHeldChannelIsRead) {
               5);  // Hz; where it turns round some are equal by chance
 }
 
+// A motor that rests, swings out at once and comes back: the way that makes up for the rest is none.
+TEST(RecordCheck, AMotorThatRestsAndSwingsIsNotHeld) {
+  Record r;
+  r.name = "run.csv";
+  for (int k = 0; k < 10000; ++k) {
+    const int since = k % 400 - 300;  // samples since the swing began
+    r.time.push_back(k * kInterval);
+    r.column(Channel::motor_torque).push_back(since > 0 ? std::cos(M_PI * since / 100) : 0.1);
+    r.column(Channel::motor_position)
+        .push_back(since > 0 ? rounded(std::sin(M_PI * since / 100), 1e-3) : 1e-3);
+  }
+  EXPECT_EQ(find(check_record(r).check, FindingKind::held_samples), nullptr);
+}
+
 // Only the rows in which the encoder was read are used: 0, 8, 16 of the record as it was before it was held.
 TEST(RecordCheck, UsesTheRowsWithNewValues) {
   const Record before = healthy();

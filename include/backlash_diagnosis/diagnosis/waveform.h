@@ -16,9 +16,9 @@
 // No declared value has to be right, only its spread. What the spreads below are where the rig file does not
 // say them is a choice: what data sheets and drawings are good for.
 //
-// The exponent n is as declared; alpha or c may be absent. No rig file has the hysteresis h of the teeth: all
-// teeth have some per cent, and without it torque alone shows too large a play; an angle does not need it. A
-// mesh of angles has rb = 1: d in rad, F in N m.
+// The exponent n is as declared; alpha or c may be absent. All teeth have some per cent of hysteresis h, and
+// no rig file states it. By torque alone it is fitted always, as without it the play comes out too large;
+// with an angle it is among what a rig file may lack. A mesh of angles has rb = 1: d in rad, F in N m.
 //
 // Symmetry of torque alone: with inertias, damping and stiffnesses times s, the contact's K times s^n and its
 // alpha and c times s, and the backlash divided by s, the torque is the same. From torque alone the play is
@@ -34,9 +34,9 @@
 // machine does not follow lose weight. Where the plain machine leaves more than noise (1 % of the swing of
 // the torque, 0.06 % of that of the position) it is fitted once more with what a rig file may lack, each with
 // "nothing, give or take what such machines have": motor friction that falls with speed or grows with the
-// load, quadratic drag, friction of the pinion, teeth of another exponent, a curved sensor. What is left then
-// is the same from sample to sample within half a cycle and from window to window, and counts that much more
-// as noise.
+// load, quadratic drag, friction of the pinion, teeth of another exponent or with hysteresis, a curved
+// sensor. What is left then is the same from sample to sample within half a cycle and from window to window,
+// and counts that much more as noise.
 //
 // An answer passes five gates:
 //

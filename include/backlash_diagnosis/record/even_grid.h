@@ -25,6 +25,11 @@ struct EvenGrid {
   bool whole(std::size_t first, std::size_t rows) const { return count(first, rows) == rows; }
 };
 
+/// Rows of an even base of this interval [s] on which samples with these increasing times [s] stand, counted
+/// from the first. A long interval has lost samples in it where several samples on both sides of it are apart
+/// by more: one that is late is followed by a short one, and jitter of a quarter of an interval averages out.
+std::vector<std::size_t> rows_of_samples(const std::vector<double>& time, double interval);
+
 /// A record that is even to a thousandth of an interval is returned as it is, with rows for lost samples. Of
 /// others the positions say which is even, the sampling or the stamps: where they go on more smoothly at the
 /// stamps, they were taken then, and are interpolated; else the stamps jitter, and even ones take their
