@@ -3,8 +3,7 @@
 """Checks the words of code, messages and pages: none that scripts/words.txt forbids (doc/reference/words.md says what to write).
 
 A word is also found as a part of a name (kNAME, name_of, NameLess). Exit code 1 where one is found.
-Usage: check_words.py [PATH...]  without paths: the whole repository but the places that words.txt lists as not yet read;
-                                 with paths: these, whatever words.txt lists
+Usage: check_words.py [PATH...]  without paths: the whole repository
 """
 import re
 import sys
@@ -19,7 +18,7 @@ PART = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")  # of a name
 
 
 def read_list():
-    entries = {"word": set(), "name": set(), "phrase": [], "allow": [], "except": {LIST}, "unread": []}
+    entries = {"word": set(), "name": set(), "phrase": [], "allow": [], "except": {LIST}}
     for number, line in enumerate(LIST.read_text().splitlines(), 1):
         kind, _, rest = line.split("#")[0].strip().partition(" ")
         if not kind:
@@ -29,8 +28,6 @@ def read_list():
         if kind in ("phrase", "allow"):
             words = [re.escape(word) for word in rest.split()]
             entries[kind].append(re.compile(r"(?<![A-Za-z])" * (kind == "phrase") + GAP.join(words) + r"(?![a-z])", re.IGNORECASE))
-        elif kind == "unread":
-            entries[kind].append(ROOT / rest.strip())
         elif kind == "except":
             entries[kind].add(ROOT / rest.strip())
         else:
@@ -73,26 +70,14 @@ def found_in(file, entries):
 
 def main():
     entries = read_list()
-    paths = [Path(path).resolve() for path in sys.argv[1:]]
-    unread = [] if paths else entries["unread"]
-    waiting = dict.fromkeys(unread, 0)
     read = bad = 0
-    for file in files_of(paths or [ROOT / place for place in PLACES], entries["except"]):
-        hits = found_in(file, entries)
-        place = next((p for p in unread if p == file or p in file.parents), None)
-        if place:
-            waiting[place] += len(hits)
-            continue
+    for file in files_of([Path(path).resolve() for path in sys.argv[1:]] or [ROOT / place for place in PLACES], entries["except"]):
         read += 1
-        bad += len(hits)
         shown = file.relative_to(ROOT) if ROOT in file.parents else file
-        for line, what in hits:
+        for line, what in found_in(file, entries):
+            bad += 1
             print(f"{shown}:{line}: '{what}': doc/reference/words.md says what to write instead")
-    for place, hits in waiting.items():
-        if not hits:
-            print(f"{place.relative_to(ROOT)}: none left, can be taken out of the list of places not yet read in scripts/words.txt")
-    rest = f"; not yet read: {sum(waiting.values())} words in {len(waiting)} places" if waiting else ""
-    print(f"{read} files, {bad} forbidden words{rest}")
+    print(f"{read} files, {bad} forbidden words")
     return 1 if bad else 0
 
 
