@@ -41,6 +41,7 @@ constexpr double kVague = 4;            // upper over lower end of an interval, 
 constexpr double kLaw = 0.2;  // of a flank's deflection, 95 %: laws of teeth in no prior: simulation
 // Theory: Hertz's flanks fitted by lines move the gap by 0.30 of the deflection, and leave 0.0327 rms.
 constexpr double kLawOfLeft = 0.30 / 0.0327;
+constexpr double kPlaces = 5;  // times the place that is unknown while a time is, 95 %: simulation
 // Of the play: what moves it beside the declared, by the motor alone and with the load's encoder, whose error
 // follows the place; 95 %: simulation.
 constexpr double kModel = 0.15, kModelByLoad = 0.04;
@@ -149,7 +150,7 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
           fmt::format("{} windows of the record show the play only from {:.2g} to {:.2g} rad: moves that "
                       "reverse, and press both flanks, would do",
                       windows, fit.gap() * std::exp(-half), fit.gap() * std::exp(half))};
-    const double law = std::min(tried, kLaw * deflection(fit, data));
+    const double law = std::hypot(std::min(tried, kLaw * deflection(fit, data)), kPlaces * data.unsure_place);
     lower = std::min(lower, fit.gap() - std::hypot(fit.gap() * (1 - std::exp(-half)), law));
     upper = std::max(upper, fit.gap() + std::hypot(fit.gap() * (std::exp(half) - 1), law));
   }

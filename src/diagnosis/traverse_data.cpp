@@ -31,9 +31,12 @@ constexpr double kAveraged = 0.16;    // cycles, half width of the average
 constexpr double kSlow = 0.02;        // of the rms speed: there dry friction takes any value
 constexpr double kFade = 0.01;        // of it: the load's friction turns its sign within
 constexpr std::size_t kFewestSamples = 256;
-constexpr double kEnd = 0.02;       // share of the samples at either end of a range, of which outliers may be
-constexpr double kShown = 5e-5;     // rad, of an encoder, beside its eccentricity: 10 seconds of arc
-constexpr double kUntracked = 0.1;  // of the usual torque, on the load
+constexpr double kEnd = 0.02;    // share of the samples at either end of a range, of which outliers may be
+constexpr double kShown = 5e-5;  // rad, of an encoder, beside its eccentricity: 10 seconds of arc
+constexpr double kOffInTime =
+    0.05;  // of the range of motor minus load position, as the rms joint moves: choice
+constexpr double kSecondDifference = 2.45;   // theory: sqrt(6), of the noise of a sample
+constexpr double kUntracked = 0.1;           // of the usual torque, on the load
 constexpr double kRough = 0.1, kFaster = 4;  // of the range; times the rate, that would show more
 constexpr double kTile = 6;                  // cycles, of a window with the load's encoder
 constexpr std::size_t kFewestTile = 48;      // samples, of it
@@ -216,6 +219,14 @@ void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycl
   d.within = count_within(turns, d);
 }
 
+Refusal unsure_times(double time, double place) {
+  return {Status::out_of_domain,
+          fmt::format(
+              "the stamps jitter, and when the samples were taken is known to {:.2g} s, in which the joint "
+              "moves by {:.2g} rad: stamps of the sampling, or even samples, would do",
+              time, place)};
+}
+
 /// The motor's motion.
 TraverseData motor_of(const record::EvenGrid& even, const GapTraverseSettings& settings, double fewest) {
   const record::Record& record = even.record;
@@ -236,6 +247,7 @@ TraverseData motor_of(const record::EvenGrid& even, const GapTraverseSettings& s
   }
   if (!(squares > 0)) throw Refusal{Status::insufficient_data, "the motor does not move"};
   d.slow = kFade * std::sqrt(squares);
+  if (record.unsure_time > 0) d.unsure_place = record.unsure_time * std::sqrt(squares);
   for (std::size_t i = 0; i < n; ++i)  // beside a lost sample the differences are not measured
     d.counts[i] = std::fabs(d.rate[i]) > kSlow * std::sqrt(squares) &&
                   even.whole(i - std::min<std::size_t>(i, 1), std::min<std::size_t>(3, n - i + (i > 0)));
@@ -268,6 +280,7 @@ void read_load(TraverseData& d, const record::EvenGrid& even, const GapTraverseS
                               "more than {:.2g} rad "
                               "of a range of {:.2g}: a rate of {:.0f} Hz and more would show how",
                               rough, d.width, kFaster / d.interval)};
+  if (d.unsure_place > kOffInTime * d.width) throw unsure_times(even.record.unsure_time, d.unsure_place);
   for (double& q : d.load) q += middle;
   d.load_counts.assign(n, 0);
   for (const double q : d.position) d.sine.push_back(std::sin(q)), d.cosine.push_back(std::cos(q));
@@ -344,6 +357,8 @@ TraverseData traverse_data(const record::Record& recorded, const GapTraverseSett
   d.noise = noise_of(quadratic.value, d.torque_noise, differences);
   d.slope_noise = noise_of(quadratic.slope, d.torque_noise, differences) / d.interval;
   find_windows(d, teeth, cycle, motor.unsure);
+  if (kSecondDifference * motor.inertia * d.unsure_place / (d.interval * d.interval) > d.level)
+    throw unsure_times(even.record.unsure_time, d.unsure_place);
   if (settings.load_torque)
     for (TraverseWindow& w : d.windows)
       w.load_torque = settings.load_torque(d.position[w.first + d.samples / 2]);

@@ -44,6 +44,7 @@ struct TraverseData {
   double load_noise = 0, load_rate_noise = 0;  // rad, rad/s, white
   double shown_spread = 0;                     // rad, of the encoders' errors from window to window
   double load_torque_spread = 0;               // N m, of what nothing explains from window to window
+  double unsure_place = 0;  // rad, by which the joint moves while the time of a sample is not known
   double width = 0, window_width = 0;  // rad, of motor minus load position, and within most of the windows
   std::size_t crossings = 0;           // changes of flank, of which windows may hold several
   std::size_t within = 0;              // of them, from flank to flank in a window

@@ -189,7 +189,7 @@ std::size_t waveform_length(const WaveformWindow& window, double rings, double r
 
 WaveformData waveform_data(const record::Record& record, const WaveformCut& cut) {
   WaveformData data;
-  data.time = record::sampling_times(record);
+  data.time = record::sampling_times(record).time;
   data.interval = record.sampling_interval();
   if (!(data.interval * kSamplesPerRing < cut.ring))
     throw Refusal{

@@ -5,6 +5,7 @@
 #include <ceres/normal_prior.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -130,9 +131,9 @@ WindowedFit::Part WindowedFit::part_of(int window, const VectorXd& mine, bool wi
   return part;
 }
 
-void WindowedFit::evaluate() {
+void WindowedFit::evaluate(bool with_shared) {
   for_each_in_parallel(windows_->count(),
-                       [&](int w) { parts_[std::size_t(w)] = part_of(w, own[std::size_t(w)], true); });
+                       [&](int w) { parts_[std::size_t(w)] = part_of(w, own[std::size_t(w)], with_shared); });
 }
 
 void WindowedFit::settle() {
@@ -155,9 +156,18 @@ void WindowedFit::settle() {
 }
 
 void WindowedFit::run(const FitOptions& options) {
-  evaluate();  // for the number of residuals
   robust_ = options.robust;
+  cost_ = std::numeric_limits<double>::infinity();
+  // From where a window cannot be followed nothing leads on, and Ceres would write that to the user's screen.
+  const auto followed = [&] {
+    return std::all_of(parts_.begin(), parts_.end(),
+                       [](const Part& p) { return p.residual.allFinite() && p.slopes.allFinite(); });
+  };
+  evaluate(false);
+  if (!followed()) return;
   settle();
+  evaluate();
+  if (!followed()) return;
   Evaluation evaluation(*this);
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &evaluation;
@@ -190,7 +200,7 @@ void WindowedFit::run(const FitOptions& options) {
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   evaluation.take();
-  cost_ = summary.IsSolutionUsable() ? 2 * summary.final_cost : std::numeric_limits<double>::infinity();
+  if (summary.IsSolutionUsable()) cost_ = 2 * summary.final_cost;
   central_ = options.central;
   evaluate();
   central_ = false;

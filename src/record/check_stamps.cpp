@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
 #include "backlash_diagnosis/record/even_grid.h"
 #include "backlash_diagnosis/record/time_base.h"
@@ -15,10 +15,8 @@ namespace {
 
 constexpr double kMissing = 0.5;   // theory: of an interval, half of what one lost sample adds
 constexpr double kJitters = 0.01;  // choice: of an interval, standard deviation worth a look at the motion
-constexpr double kClearlyBetter =
-    0.5;                         // theory: one of the two readings leaves nothing where the other is wrong
-constexpr double kOnGrid = 0.5;  // theory: of an interval, beyond which a stamp is nearer to another row
-constexpr double kSteady = 0.2;  // choice: of the speed, by which it may change across a step of the clock
+constexpr double kOnGrid = 0.5;    // theory: of an interval, beyond which a stamp is nearer to another row
+constexpr double kSteady = 0.2;    // choice: of the speed, by which it may change across a step of the clock
 constexpr double kClearMotion = 20;  // choice: steps of the sensor that a speed must pass to be one
 
 /// The clock jumped between i and i + 1 by more than the motion did: the speed before and after, being the
@@ -57,26 +55,6 @@ std::string describe(const Lost& lost, const std::vector<double>& time) {
              lost.places, time[lost.first], lost.most, time[lost.most_after]);
 }
 
-/// Which stamps the motion follows: on a straight line from neighbour to neighbour the position leaves less
-/// with the times at which it was sampled than with others.
-bool samples_are_even(const RecordLook& look) {
-  const std::vector<double>& t = look.record.time;
-  for (const Channel channel : kEncoders) {
-    const std::vector<double>& x = look.record.column(channel);
-    if (x.empty()) continue;
-    double by_stamps = 0, evenly = 0;
-    for (std::size_t i = 1; i + 1 < x.size(); ++i) {
-      if (t[i + 1] - t[i - 1] > (2 + kMissing) * look.interval) continue;
-      const double way = x[i + 1] - x[i - 1], share = (t[i] - t[i - 1]) / (t[i + 1] - t[i - 1]);
-      const double on_line = x[i] - x[i - 1];
-      by_stamps += std::pow(on_line - share * way, 2);
-      evenly += std::pow(on_line - 0.5 * way, 2);
-    }
-    return evenly < kClearlyBetter * by_stamps;
-  }
-  return false;
-}
-
 void look_at_jitter(RecordLook& look, const std::vector<std::size_t>& rows) {
   std::vector<double>& t = look.record.time;
   double squares = 0;
@@ -87,22 +65,17 @@ void look_at_jitter(RecordLook& look, const std::vector<std::size_t>& rows) {
     ++count;
   }
   look.out.stamps.jitter = count > 0 ? std::sqrt(squares / double(count)) : 0;
-  if (look.out.stamps.jitter < kJitters || !samples_are_even(look)) return;
-  look.out.stamps.of_stamps_only = true;
+  if (look.out.stamps.jitter < kJitters) return;
+  SamplingTimes times = sampling_times(look.record);
+  look.out.stamps.of_stamps_only = times.stamped < 0.5;
+  look.out.stamps.unsure = times.unsure / look.interval;
   if (look.declared.shares_stamps) return;
-  const double n = double(t.size()), mean_row = std::accumulate(rows.begin(), rows.end(), 0.0) / n,
-               mean_time = std::accumulate(t.begin(), t.end(), 0.0) / n;
-  double along = 0, square = 0, furthest = 0;
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    along += (double(rows[i]) - mean_row) * (t[i] - mean_time);
-    square += std::pow(double(rows[i]) - mean_row, 2);
-  }
-  const double interval = along / square;
-  for (std::size_t i = 0; i < t.size(); ++i)
-    furthest = std::max(furthest, std::fabs(t[i] - mean_time - interval * (double(rows[i]) - mean_row)));
-  if (furthest > kOnGrid * interval) return;  // a clock that drifts: stamps stay as they are
-  for (std::size_t i = 0; i < t.size(); ++i) t[i] = mean_time + interval * (double(rows[i]) - mean_row);
-  look.out.stamps.evened = true;
+  double moved = 0;
+  for (std::size_t i = 0; i < t.size(); ++i) moved += std::pow(times.time[i] - t[i], 2) / double(t.size());
+  if (std::sqrt(moved) > kOnGrid * look.interval) return;  // a clock that drifts: stamps stay as they are
+  look.out.stamps.evened = times.stamped < 1;
+  t = std::move(times.time);
+  look.record.unsure_time = times.unsure;
 }
 
 }  // namespace

@@ -97,6 +97,7 @@ Record Record::slice(double from, double to) const& {
   part.origin = origin;
   part.repeated_stamps = repeated_stamps;
   part.first_repeated_stamp = first_repeated_stamp;
+  part.unsure_time = unsure_time;
   part.time.assign(time.begin() + first, time.begin() + last);
   for (const Channel channel : kChannels) {
     const std::vector<double>& all = column(channel);

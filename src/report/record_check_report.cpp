@@ -56,8 +56,10 @@ std::string describe(const record::StampState& stamps) {
   if (stamps.jitter >= 0.01) {
     text += fmt::format(", stamps {:.2g} % of an interval uneven", 100 * stamps.jitter);
     if (stamps.of_stamps_only)
-      text += stamps.evened ? "; the samples are even, as the positions show: even stamps are used"
-                            : "; the samples are even, as the positions show";
+      text += stamps.evened ? "; the samples are more even, as the positions show: even stamps are used"
+                            : "; the samples are more even, as the positions show";
+    if (stamps.unsure > 0)
+      text += fmt::format("; when they were taken is known to {:.2g} % of an interval", 100 * stamps.unsure);
   }
   return text + "\n";
 }
@@ -145,7 +147,8 @@ std::string record_check_json(const CheckedFile& file, const std::vector<Serves>
     const record::RecordCheck& check = file.joints.front().check;
     stamps = {{"interval", json_number(check.stamps.interval)},
               {"jitter", json_number(check.stamps.jitter)},
-              {"samples_even", check.stamps.of_stamps_only}};
+              {"samples_even", check.stamps.of_stamps_only},
+              {"unsure", json_number(check.stamps.unsure)}};
     for (const record::Stretch& stretch : check.usable)
       usable.push_back({json_number(stretch.from), json_number(stretch.to)});
   }

@@ -343,7 +343,8 @@ TEST(RecordCheck, RefusesASpeedInPlaceOfAPosition) {
 TEST(RecordCheck, SaysThatThePositionsComeApart) {
   Record r = healthy();
   for (std::size_t k = 0; k < r.size(); ++k) r.column(Channel::load_position)[k] += 5e-4 * r.time[k];
-  const Finding* const drift = find(check_record(r, servo()).check, FindingKind::drift);
+  const CheckedRecord checked = check_record(r, servo());
+  const Finding* const drift = find(checked.check, FindingKind::drift);
   ASSERT_NE(drift, nullptr);
   EXPECT_EQ(drift->consequence, Consequence::noted);
 }

@@ -41,7 +41,8 @@
 // another: Student's t with the larger of two standard errors of the logarithm (the fit's own; windows as
 // clusters), 4 % of the play for what the machine does not hold (15 % by the motor alone) and the share of
 // the channel that is left beyond noise, and a fifth of the deflection of a flank under T0 for laws of teeth
-// that are none of these. Of a commissioned machine (GapTraverseSettings::unexplained) its law was tried: in
+// that are none of these, and five times what the joint moves while the times of the samples are not known
+// (record/even_grid.h). Of a commissioned machine (GapTraverseSettings::unexplained) its law was tried: in
 // place of the fifth stands 9.2 times the rms of what the commissioning left beyond noise where that is less,
 // and with the load's encoder in place of the 4 % too, as that rms holds what the encoders err. Counted on
 // joints of test/campaigns/robot_joints that were drawn afterwards (doc/reference/estimators.md).

@@ -61,7 +61,7 @@ class WindowedFit {
   void run(const FitOptions& options);
 
   double value(int which) const { return windows_->shared()[std::size_t(which)].value(shared[which]); }
-  double cost() const { return cost_; }
+  double cost() const { return cost_; }  ///< infinite where no machine could be followed
   /// Of a window's squares, 0 to 1, at what run() found.
   double weight(int window) const;
   /// Residuals of a window there.
@@ -83,7 +83,7 @@ class WindowedFit {
     Eigen::VectorXd residual;
     Eigen::MatrixXd slopes;  // shared, then own
   };
-  void evaluate();
+  void evaluate(bool with_shared = true);
   Part part_of(int window, const Eigen::VectorXd& own_values, bool with_shared) const;
   /// Own values of each window, with the shared ones as they are: steps of all together from a poor start
   /// lead astray.

@@ -26,18 +26,26 @@ struct EvenGrid {
 };
 
 /// Rows of an even base of this interval [s] on which samples with these increasing times [s] stand, counted
-/// from the first. A long interval has lost samples in it where several samples on both sides of it are apart
-/// by more: one that is late is followed by a short one, and jitter of a quarter of an interval averages out.
+/// from the first, as is likeliest with jitter of the size that they show and one sample of 200 lost: a long
+/// interval has lost samples in it where those behind it stay behind, and samples that come late in one burst
+/// have the rows of when they were taken.
 std::vector<std::size_t> rows_of_samples(const std::vector<double>& time, double interval);
 
-/// A record that is even to a thousandth of an interval is returned as it is, with rows for lost samples. Of
-/// others the positions say which is even, the sampling or the stamps: where they go on more smoothly at the
-/// stamps, they were taken then, and are interpolated; else the stamps jitter, and even ones take their
-/// place. A record of which more than half would be lost is returned as it is.
-EvenGrid even_grid(const Record& record);
+/// When samples were taken.
+struct SamplingTimes {
+  std::vector<double> time;  ///< s
+  double stamped = 0;        ///< 0 to 1, how much of what a stamp is off an even base its sample was, too
+  double unsure = 0;         ///< s, standard deviation of what remains unknown of a time
+};
 
-/// When the samples were taken, for methods that take each at its own time: as even_grid() decides, at the
-/// stamps or evenly, with lost samples between them.
-std::vector<double> sampling_times(const Record& record);
+/// Samples are taken late, or stamped late, or both. A position shows which: its sample is off by the rate
+/// times what it was late. Taken as the mean that this leaves, between an even base (the stamps alone jitter)
+/// and the stamps. Where Record::unsure_time is known the times of the record are these.
+SamplingTimes sampling_times(const Record& record);
+
+/// A record that is even to a thousandth of an interval is returned as it is, with rows for lost samples.
+/// Others are interpolated between sampling_times(); Record::unsure_time is what is unknown of them. A record
+/// of which more than half would be lost is returned as it is.
+EvenGrid even_grid(const Record& record);
 
 }  // namespace backlash::record

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -53,6 +54,9 @@ class Record {
   double origin = 0;                  ///< s since 1970 of time 0; 0 where `time` is as in the file
   std::size_t repeated_stamps = 0;    ///< samples that the reader dropped, as their stamp was that before
   double first_repeated_stamp = 0;    ///< s, valid where repeated_stamps > 0
+  /// s, standard deviation of when the samples were taken about `time`; NaN: nobody looked
+  /// (record/even_grid.h).
+  double unsure_time = std::numeric_limits<double>::quiet_NaN();
 
   std::size_t size() const { return time.size(); }
   bool has(Channel channel) const { return !column(channel).empty(); }

@@ -29,8 +29,9 @@ struct StampState {
   std::size_t lost = 0;         // samples
   std::size_t repeated = 0;     // samples, dropped by the reader
   double jitter = 0;            // standard deviation of the intervals over their median
-  bool of_stamps_only = false;  // the samples are even, as the positions show, the stamps are not
-  bool evened = false;          // the record has even stamps in their place
+  bool of_stamps_only = false;  // the samples are more even than the stamps, as the positions show
+  bool evened = false;          // the record has their times in place of the stamps
+  double unsure = 0;            // intervals, standard deviation of what is unknown of these
 };
 
 /// A step of a position, between two samples.
