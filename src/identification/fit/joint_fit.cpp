@@ -23,7 +23,6 @@ namespace {
 constexpr double kFarthest = 30;  // choice: factor by which a positive parameter may differ from its start; a
                                   // bound that is approached and never reached
 constexpr double kDrawn = 0.3;    // simulation: share of what is left that follows what a value changes
-constexpr double kWideStep = 1e-2;  // simulation: relative, of the differences that the errors are taken from
 constexpr double kNegligible = 2e-3;  // choice: of a signal: no floor is lower, no model need be better
 constexpr double kVague = 30;  // choice: times the scale: standard deviation of the prior of a parameter
 constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
@@ -71,7 +70,7 @@ Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, con
 }
 
 /// Points that the rig refuses are left out.
-signal::AheadFunction ahead(const Unknowns& unknowns, const RecordSet& records) {
+fit::AheadFunction ahead(const Unknowns& unknowns, const RecordSet& records) {
   return [&](const std::vector<Eigen::VectorXd>& points) {
     std::vector<Machine> machines;
     for (const Eigen::VectorXd& p : points) try {
@@ -342,12 +341,12 @@ std::map<std::string, signal::Measured> Unknowns::parameters(const MachineFit& f
   return all;
 }
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records, signal::NonlinearOptions options) {
+MachineFit fit_machine(const Machine& start, const RecordSet& records, fit::NonlinearOptions options) {
   const Unknowns unknowns(start);
   options.ahead = ahead(unknowns, records);
   MachineFit out;
-  out.fit = signal::fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
-                                  unknowns.values(), unknowns.scale(), options);
+  out.fit = fit::fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
+                               unknowns.values(), unknowns.scale(), options);
   out.machine = unknowns.machine(out.fit.values);
   return out;
 }
@@ -361,9 +360,6 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
     longest = std::max(longest, time_between_reversals(record.data()));
   const Eigen::Index wanted = std::max(1L, 2 * std::lround(longest / records.row_interval()));
   const Eigen::Index block = std::clamp<Eigen::Index>(rows / (kFewestBlocks * unknowns.size()), 1, wanted);
-  signal::widen_jacobian(
-      fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
-      kWideStep * unknowns.scale(), ahead(unknowns, records), true);
   const Eigen::VectorXd independent = fit.fit.covariance.diagonal();
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
   fit.reach = reach_of_values(

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/fit/nonlinear.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/identification/fit/output_error.h"
-#include "backlash_diagnosis/signal/least_squares.h"
 #include "fit_parameter.h"
 #include "servo_prediction.h"
 
@@ -119,12 +119,13 @@ class Unknowns {
   std::size_t per_record_;
 };
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records, signal::NonlinearOptions options);
+MachineFit fit_machine(const Machine& start, const RecordSet& records, fit::NonlinearOptions options);
 
-/// Takes off what sampling makes of the values (sampling.h), and gives their covariance from wide steps and
-/// from blocks of the records as long as the time between two reversals of the motor, the larger: until the
-/// next reversal what friction and play leave keeps its sign. A part of what was taken off counts as an
-/// error. Of a machine that is coupled to other axes also what is left counts as if it followed each value.
+/// Takes off what sampling makes of the values (sampling.h), and gives their covariance from the wide steps
+/// of the last fit and from blocks of the records as long as the time between two reversals of the motor, the
+/// larger: until the next reversal what friction and play leave keeps its sign. A part of what was taken off
+/// counts as an error. Of a machine that is coupled to other axes also what is left counts as if it followed
+/// each value.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
 /// An effect that the model lacks (kShowsMissingEffect) may follow what a value changes, and draws it without

@@ -38,12 +38,12 @@ BandFit fit_until_settled(const RecordSet& records, const Machine& start, double
 
 }  // namespace
 
-signal::NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map) {
-  signal::NonlinearOptions options;
+fit::NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map) {
+  fit::NonlinearOptions options;
   options.iterations = with_map ? settings.iterations_of_map : settings.iterations;
-  options.step = settings.step;
   options.tolerance = tolerance;
-  if (tolerance <= settings.tolerance) options.wide_iterations = with_map ? 0 : settings.wide_iterations;
+  options.central = tolerance <= settings.tolerance;
+  options.step = options.central ? settings.wide_step : settings.step;
   options.parallel = true;
   return options;
 }

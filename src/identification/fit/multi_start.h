@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/fit/nonlinear.h"
 #include "backlash_diagnosis/identification/fit/fit_settings.h"
 #include "joint_fit.h"
 
@@ -24,7 +25,7 @@ struct BandFit {
 using BeforeFit = std::function<void()>;
 
 /// As the settings say, with another tolerance; `with_map`: of a machine with a learned map.
-signal::NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map);
+fit::NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map);
 
 /// One fit with weights of its own, those of `start` in this band [Hz]. `settings` have their bands. `data`
 /// must outlive what is returned. Throws CannotIdentify.

@@ -9,11 +9,11 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/fit/nonlinear.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/presliding.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
-#include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash::identification {
@@ -203,7 +203,7 @@ class SimulatedLoads {
 
  private:
   // So that a Jacobian's columns find the load of its centre, and those that were prepared.
-  static constexpr std::size_t kKept = signal::kPointsAtOnce + 2;
+  static constexpr std::size_t kKept = fit::kPointsAtOnce + 2;
 
   std::shared_ptr<const SimulatedLoad> find(const model::Rig& acting, const Drive& drive) {
     const std::lock_guard<std::mutex> lock(mutex_);

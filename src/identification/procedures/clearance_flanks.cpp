@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/fit/nonlinear.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
 namespace backlash::identification {
@@ -105,7 +105,7 @@ PassageFit fit_flanks(const std::vector<FlankPassage>& passages, double low, dou
       start = p;
     }
   const signal::LeastSquaresFit fit =
-      signal::fit_nonlinear(residuals, start, Eigen::Vector2d::Constant(0.1 * travel));
+      fit::fit_nonlinear(residuals, start, Eigen::Vector2d::Constant(0.1 * travel));
   PassageFit f;
   f.flanks = {fit.values[0], fit.values[1]};
   f.contact = contact_at(f.flanks);

@@ -11,6 +11,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/fit/nonlinear.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/signal/block_regression.h"
@@ -49,10 +50,10 @@ double spread(const Eigen::VectorXd& values) {
 }
 
 /// Differences over more than a step of the encoder, which hides smaller changes.
-signal::NonlinearOptions wide_steps() {
-  signal::NonlinearOptions options;
-  options.step = 0.02;
-  options.wide_step = 0.1;
+fit::NonlinearOptions wide_steps() {
+  fit::NonlinearOptions options;
+  options.step = 0.1;
+  options.central = true;
   return options;
 }
 
@@ -96,7 +97,7 @@ class Fit {
 
  private:
   Eigen::VectorXd column(Lack lack, const Eigen::VectorXd& p) const {
-    return signals_.picked(signals_.lack(lack, rig_, mesh_of(p)));
+    return signals_.picked(signals_.lack(lack, rig_, {p_[kStiffness], p[kPlus], p[kMinus], p[kDrift]}));
   }
   Eigen::VectorXd mesh(const LockedMesh& m) const { return signals_.picked(signals_.mesh_torque(rig_, m)); }
   struct Start {
@@ -189,18 +190,17 @@ void Fit::start() {
 }
 
 void Fit::refine() {
-  signal::NonlinearOptions options = wide_steps();
-  options.wide_iterations = 6;
+  const fit::NonlinearOptions options = wide_steps();
   const auto f = [this](const Eigen::VectorXd& p) { return rows(p); };
   double least = INFINITY;
   for (const Eigen::VectorXd& p : starts_) {
-    const signal::LeastSquaresFit fit = signal::fit_nonlinear(f, p, scale_, options);
+    const signal::LeastSquaresFit fit = fit::fit_nonlinear(f, p, scale_, options);
     if (fit.residuals.norm() >= least) continue;
     least = fit.residuals.norm();
     fit_ = fit;
   }
   sigma_ *= rms(fit_.residuals.head(torque_.size()));  // rows of variance 1
-  fit_ = signal::fit_nonlinear(f, fit_.values, scale_, options);
+  fit_ = fit::fit_nonlinear(f, fit_.values, scale_, options);
   p_ = fit_.values;
   starts_ = {p_};
 }
@@ -223,10 +223,6 @@ void Fit::widen(const Eigen::VectorXd& variance) {
 
 void Fit::judge(double floor) {
   const Eigen::Index n = torque_.size();
-  const auto f = [this](const Eigen::VectorXd& p) { return rows(p); };
-  Eigen::VectorXd steps = 1e-2 * scale_;
-  steps[kPlus] = steps[kMinus] = 0.02 * travel_.size();
-  signal::widen_jacobian(fit_, f, steps);
   const auto pass = Eigen::Index(double(n) / passes_);
   const Eigen::Index longest = n / (kUnknowns + kSpareBlocks), shortest = n / (4 * kUnknowns);
   const Eigen::MatrixXd white = fit_.covariance;
@@ -272,7 +268,7 @@ void Fit::add_noise_of_motion(const Eigen::MatrixXd& white) {
 
 /// By how much the values move where an effect that the rig does not declare is fitted as well and is clear.
 void Fit::add_lacks() {
-  const signal::NonlinearOptions options = wide_steps();
+  const fit::NonlinearOptions options = wide_steps();
   Eigen::VectorXd start = Eigen::VectorXd::Zero(kUnknowns + 1), scale = start;
   start.head(kUnknowns) = p_;
   scale.head(kUnknowns) = scale_;
@@ -285,7 +281,7 @@ void Fit::add_lacks() {
     scale[kUnknowns] = spread(torque_) / rms(column(lack, p_));
     signal::LeastSquaresFit wider;
     try {
-      wider = signal::fit_nonlinear(f, start, scale, options);
+      wider = fit::fit_nonlinear(f, start, scale, options);
     } catch (const CannotIdentify&) {
       continue;  // the record does not distinguish the two
     }

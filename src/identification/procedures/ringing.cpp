@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/fit/nonlinear.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
@@ -82,8 +83,8 @@ Ringing fit_ringing(const std::vector<double>& time, const std::vector<double>& 
     throw CannotIdentify("ringing of fewer than " + std::to_string(kFewestSamples) + " samples");
   const DampedSine sine(time, values);
   const signal::LeastSquaresFit fit =
-      signal::fit_nonlinear([&](const Eigen::VectorXd& p) { return sine.residuals(p); },
-                            start_of(sine, expected), Eigen::Vector2d::Constant(kTypical * expected));
+      fit::fit_nonlinear([&](const Eigen::VectorXd& p) { return sine.residuals(p); },
+                         start_of(sine, expected), Eigen::Vector2d::Constant(kTypical * expected));
   Ringing r;
   r.time = time;
   r.measured = values;

@@ -7,8 +7,8 @@
 #include <functional>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/fit/nonlinear.h"
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
-#include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash::identification {
@@ -105,7 +105,7 @@ TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse&
   add(points, motor, false);
   add(points, load, true);
   const auto fitted = [&](const Eigen::VectorXd& from) {
-    return signal::fit_nonlinear([&](const Eigen::VectorXd& q) { return residuals(points, q); }, from, scale);
+    return fit::fit_nonlinear([&](const Eigen::VectorXd& q) { return residuals(points, q); }, from, scale);
   };
   signal::LeastSquaresFit fit = fitted(p);
   points = without_outliers(points, fit);

@@ -31,9 +31,9 @@ struct FitSettings {
   double step = 1e-3;             // theory: forward differences, above the noise of the simulated load
   double rough_tolerance = 1e-3;  // choice: relative, of all fits but the last
   double tolerance = 1e-6;        // choice: relative, of the last
-  int wide_iterations = 6;        // simulation: of the last, to leave a minimum that a single touch makes
-  int renewals = 5;               // choice (time): of the weights, where a fit has changed them by more than
-  double same_weights = 0.05;     // simulation: relative
+  double wide_step = 1e-2;     // simulation: the same of the last, to both sides: its errors come from them
+  int renewals = 5;            // choice (time): of the weights, where a fit has changed them by more than
+  double same_weights = 0.05;  // simulation: relative
 
   double calibration_delay = 3;  // choice: samples; a longer delay of the torque is no calibration
 };
