@@ -1,8 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks that every room is in its namespace, and includes only headers of rooms that it may know and private headers of
-no other room.
+no other room, and that the table of rooms on a page has the sizes that they have, within a tenth.
 
+Usage: check_rooms.py CMakeLists.txt INCLUDE SRC PAGE [--write]      --write puts the sizes into the page
 What a room may know is what CMakeLists.txt says: room(NAME [FOLDER FOLDER] KNOWS ROOM... [READS_PRIVATE ROOM]), and all that those know.
 """
 import os
@@ -60,14 +61,31 @@ def misnamed(path, room, text):
     return "%s: is in backlash%s, its room in backlash%s" % (path, found[0], wanted)
 
 
-def main(cmake_file, include, src):
-    known, private, inner = known_rooms(cmake_file)
+def with_sizes(page, lines):
+    """The text of the page with the sizes of its rooms, rounded to hundreds of lines; what is wrong with those that it has."""
     problems = []
+
+    def row(match):
+        size = lines.get(match[2], 0)
+        if abs(int(match[4]) - size) > 0.1 * size + 50:
+            problems.append("%s: says %s lines of %s, which has %d (--write mends it)" % (page, match[4], match[2], size))
+        return "%s%d |" % (match[1], round(size, -2))
+
+    text, rows = re.subn(r"^(\| `(\w+)` \| ([^|]*) \| )(\d+) \|$", row, open(page).read(), flags=re.MULTILINE)
+    if rows != len(lines):
+        problems.append("%s: has a line for %d of %d rooms" % (page, rows, len(lines)))
+    return text, problems
+
+
+def main(cmake_file, include, src, page, write=""):
+    known, private, inner = known_rooms(cmake_file)
+    problems, lines = [], {room: 0 for room in known}
     for root in (include, src):
         for folder, _, names in os.walk(root):
             for path in (os.path.join(folder, name) for name in names if name.endswith((".h", ".cpp"))):
                 room = room_of(os.path.relpath(path, root), inner)
                 text = open(path).read()
+                lines[room] = lines.get(room, 0) + text.count("\n")
                 problems += filter(None, [misnamed(path, room, text)])
                 for name in INCLUDE.findall(text):
                     target = room_of_include(name, path, inner, src)
@@ -77,6 +95,12 @@ def main(cmake_file, include, src):
                         problems.append("%s: %s must not know %s (%s)" % (path, room, target[0], name))
                     elif target[1] and target[0] not in private[room]:
                         problems.append("%s: %s is private to %s" % (path, name, target[0]))
+    lines.pop("nodes", None)
+    text, differences = with_sizes(page, lines)
+    if write:
+        open(page, "w").write(text)
+    else:
+        problems += differences
     print("\n".join(problems) or "%d rooms know what they may" % len(known))
     return 1 if problems else 0
 

@@ -1,8 +1,8 @@
 #!/bin/bash
 # Checks how the files are written: the licence in the first lines of each, the layout by .clang-format, names and habits
-# by .clang-tidy, that every public header compiles alone, that rooms include only what they may know, that
-# lanes do not lie where their alignment is lost and round as one alone does, that pages lead to each other, that no word
-# of scripts/words.txt appears, and the form of messages.
+# by .clang-tidy, that every public header compiles alone, that rooms include only what they may know and have the sizes
+# that the architecture page states, that lanes do not lie where their alignment is lost and round as one alone does, that
+# pages lead to each other, that no word of scripts/words.txt appears, and the form of messages.
 # Usage: bash scripts/check_style.sh [licence|format|tidy|headers|rooms|lanes|pages|words|messages]... [--all|--since COMMIT]
 #   tidy and headers look at the files that differ from the main branch (on it: from the commit before), --all at all.
 #   format and tidy are those of clang 14 and are not tried with another; exit code 77 where that leaves nothing to do.
@@ -80,7 +80,7 @@ headers() {
 }
 
 rooms() {
-  python3 scripts/check_rooms.py CMakeLists.txt include/"${PACKAGE}" src
+  python3 scripts/check_rooms.py CMakeLists.txt include/"${PACKAGE}" src doc/architecture.md
 }
 
 # Where containers and new put lanes they may end a program on another system and not on this one, see

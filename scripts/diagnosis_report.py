@@ -48,10 +48,12 @@ class Data:
     def deflection(self):
         """Values and label of the position across the teeth, where there are teeth and the record has it."""
         motor, load = self.channels.get("motor_position"), self.channels.get("load_position")
+        # In the unit of the answers where that is one of an angle, else as a thousandth or a millionth of its own.
+        scale, unit = (1e-6, "µm") if self.linear else (1e-3, "mrad")
         if motor is not None and self.locked:
-            return motor, "motor position [%s], output locked" % self.units["motor_position"]
+            return motor / scale, "motor position [%s], output locked" % unit
         if motor is not None and load is not None and not self.rigid:
-            return motor - load, "motor - load position [%s]" % self.units["motor_position"]
+            return (motor - load) / scale, "motor - load position [%s]" % unit
         return None
 
 
@@ -182,17 +184,18 @@ def limit_lines(axes, data):
 
 
 def intervals_picture(data):
-    """All methods beside each other, those first that the verdict stands on."""
+    """All methods beside each other; no picture where none has an interval."""
     report = data.report
     rows = [(e["method"], e, e["method"] in report["verdict"]["members"]) for e in report["estimates"]]
     if report["verdict"]["members"]:
         rows.append(("together", report["verdict"], True))
     ends = np.array([v / data.scale for _, answer, _ in rows for v in interval(answer, data.key)], float)
     ends = ends[np.isfinite(ends)]
+    if not ends.size:
+        return
     figure, axes = new_figure(0.35 + 0.11 * len(rows))
-    if ends.size:
-        room = 0.12 * (ends.max() - ends.min()) or 0.1 * abs(ends.max()) or 1
-        axes.set_xlim(ends.min() - room, ends.max() + room)
+    room = 0.12 * (ends.max() - ends.min()) or 0.1 * abs(ends.max()) or 1
+    axes.set_xlim(ends.min() - room, ends.max() + room)
     for row, (name, answer, member) in enumerate(rows):
         colour = "#222222" if name == "together" else GOOD if member else PALE
         if not bar(axes, row, answer, data, colour, 4 if name == "together" else 2):
@@ -204,7 +207,7 @@ def intervals_picture(data):
     axes.set_xlabel("backlash [%s], value and 95 %% interval" % data.unit)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncol=3, fontsize=8)
-    yield plotting.picture(figure, "Intervals of all methods; green: those that the verdict stands on")
+    yield plotting.picture(figure, "Intervals of all methods; green: those that the verdict combines")
 
 
 def traces(axes, rest, window, channel, data, scale):

@@ -126,6 +126,8 @@ def _row(joint, series):
         _cell((joint["date"] or "&ndash;")[:10], joint["time"], "number"),
         _cell("<br>".join('<span title="%s">%s</span>' % (escape(note), escape(note.partition(": ")[0])) for note in notes), False,
               "text small")]
+    cells = [cell if head in ("joint", "history") else cell.replace("<td", '<td data-label="%s"' % head, 1)
+             for (head, _, _), cell in zip(HEADS, cells)]
     return '<tr data-level="%s" data-grows="%d" data-text="%s">%s</tr>' % (joint["level"], bool(trend.get("grows")),
                                                                            escape(words), "".join(cells))
 
@@ -155,7 +157,7 @@ def page(fleet, series):
              % (escape(fleet["written"][:16].replace("T", " ")), len(fleet["joints"]), sum(counts.values()),
                 counts.get("done", 0), escape("; " + other) if other else ""), _filters(fleet)]
     rows = "\n".join(_row(joint, series[joint["joint"]]) for joint in fleet["joints"])
-    lines.append('<div class="scroll"><table id="joints">%s<tbody>\n%s\n</tbody></table></div>' % (_head(), rows))
+    lines.append('<div class="scroll"><table id="joints" class="stacked">%s<tbody>\n%s\n</tbody></table></div>' % (_head(), rows))
     lines.append('<p class="small">Backlash is that of the newest record, with its 95 %% interval; growth is the rate of the '
                  'trend over all records. A joint is put under <i>service</i> or <i>watch</i> by its newest grade, or where the '
                  'trend says that the limit (dashed) is exceeded or reached within %g days. Red line: a growth that is sure '

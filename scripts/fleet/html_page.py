@@ -42,6 +42,14 @@ svg.curve { display: block; } svg.large { width: 100%; max-width: 62em; height: 
 .trend { stroke: #b3261e; stroke-width: 1.5; fill: none; } .flat { stroke: #999; stroke-width: 1; fill: none; }
 .limit { stroke: #222; stroke-width: 1; stroke-dasharray: 4 3; fill: none; }
 pre { background: #f6f6f6; padding: 0.6em 1em; overflow: auto; font-size: 0.85em; white-space: pre-wrap; overflow-wrap: anywhere; }
+/* On a telephone a row is a paragraph. */
+@media (max-width: 40em) {
+  .stacked thead, .stacked td:empty { display: none; } .stacked, .stacked tbody, .stacked tr, .stacked td { display: block; }
+  .stacked tr { padding: 0.5em 0; } .stacked tbody tr + tr { border-top: 1px solid #ccc; }
+  .stacked tbody tr td { padding: 0.1em 0; border: 0; min-width: 0; white-space: normal; }
+  .stacked td[data-label]::before { content: attr(data-label) ": "; color: #666; font-weight: normal; } .stacked td br { display: none; }
+  .stacked tr[hidden] { display: none; }
+}
 """
 LABELS = {"fault": "service", "watch": "watch", "cannot_tell": "cannot tell", "good": "good", "ungraded": "ungraded"}
 

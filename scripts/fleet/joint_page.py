@@ -53,7 +53,7 @@ def page(joint, series, rows, report_of):
     for note in joint["notes"] + (joint["trend"] or {}).get("warnings", []):
         lines.append('<p class="small">%s</p>' % escape(note))
     lines.append(svg.large(series, joint["trend"]))
-    lines.append('<h2>Records</h2>\n<div class="scroll"><table id="records"><thead><tr><th>time (UTC)</th><th>record</th>'
+    lines.append('<h2>Records</h2>\n<div class="scroll"><table id="records" class="stacked"><thead><tr><th>time (UTC)</th><th>record</th>'
                  "<th>grade</th><th>backlash</th><th>what was said</th><th></th></tr></thead><tbody>")
     lines.extend(_record(row, joint["unit"], report_of(row)) for row in reversed(rows))
     lines.append("</tbody></table></div>")

@@ -152,7 +152,7 @@ function silent(holder, joint) {
   }
   if (!unserved.length) return;
   const details = document.createElement("details"), words = document.createElement("summary"), list = document.createElement("ul");
-  words.textContent = `${unserved.length} method${unserved.length > 1 ? "s" : ""} not for what the rig file has`;
+  words.textContent = `${unserved.length} method${unserved.length > 1 ? "s" : ""} cannot be used with this rig file`;
   words.className = "small";
   details.open = open;
   list.append(...unserved.map(item));

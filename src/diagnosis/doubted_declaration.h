@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How far declared values count once the record shows that the machine is not of the declared kind.
+// How declared values enter the intervals if the record shows that the machine is not of the declared kind.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace backlash::diagnosis {
 
-/// Where `waveform` was fitted and no machine of the rig file's kind explains the record, what the answers
-/// owe to declared values (Estimate::declared) counts twice in their intervals.
+/// If `waveform` was fitted and no machine of the rig file's kind explains the record, the part of each
+/// interval that comes from declared values (Estimate::declared) is doubled.
 void doubt_declared_values(std::vector<Estimate>& estimates);
 
 }  // namespace backlash::diagnosis

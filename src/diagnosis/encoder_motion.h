@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What position_difference reads of a record before any fit: torque and both positions at the motor's axis,
-// how late the load's encoder is, and whether a machine can have moved like that.
+// What position_difference reads from a record before any fit: torque and both positions at the motor's axis,
+// the delay of the load's encoder, and whether a machine can have moved like that.
 #pragma once
 
 #include <cstddef>
@@ -33,20 +33,20 @@ double travelled(const std::vector<double>& values);
 TwoEncoders without_skew(TwoEncoders motion, double skew);
 
 /// Skew of the encoders beside the declared one, where the record shows that it is not zero; else 0 with an
-/// unknown error. The flanks hold a small one like a friction of the motor.
+/// unknown error. A small skew acts on the flanks like a friction of the motor.
 signal::Measured clear_skew(const TwoEncoders& motion, double inertia);
 
 /// A load that travels farther than the deflection varies shows friction with both signs of its speed.
 bool load_travels(const TwoEncoders& motion);
 
-/// Between two walls no torque drives the motor faster than if it pushed over the whole travel. Positions
-/// that jump are no positions: columns with exchanged names, or other units. `fastest` has thrice that speed,
-/// and only moves over half the travel count, so that neither noise nor a wrong inertia matters; slow
-/// sampling shows no jumps.
+/// Between two walls the motor is never faster than if the largest torque pushed it over the whole travel.
+/// Positions that jump faster than that are wrong: columns with exchanged names, or other units. `fastest` is
+/// three times that speed, and only moves over half of the travel are tested, so that noise and a wrong
+/// inertia do not matter. Slow sampling shows no jumps.
 void require_possible(const TwoEncoders& motion, double inertia);
 
-/// A torque that alternates throws the motor to and fro within each sample: teeth that push but never pull,
-/// damping and dry friction then do not act on the recorded means.
+/// An alternating torque can throw the motor to and fro within each sample. The recorded means of position
+/// and torque then do not obey the nonlinear laws of teeth and friction.
 void require_steady(const TwoEncoders& motion, double inertia);
 
 }  // namespace backlash::diagnosis

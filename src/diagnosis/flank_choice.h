@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Two flanks of a joint whose load moves, read in the ways that a record allows: over short windows or long
-// ones, by the recorded torque or by that which the motion takes, with a deflection that follows the torque
-// by one law or another. The way that is surest counts, and the laws that the record does not distinguish.
+// Two flanks of a joint whose load moves, read in several ways: over short or long windows, by the recorded
+// torque or by the torque that the motion takes, with one law or another of deflection over torque. The way
+// with the smallest error is taken; laws that the record does not distinguish widen the interval.
 #pragma once
 
 #include "backlash_diagnosis/diagnosis/flank_fit.h"
@@ -20,7 +20,8 @@ constexpr double kResidualShare = 0.3;
 struct FlankReading {
   FlankFit fit;
   double windows_change = 0;  // rad, change of the gap with windows twice (or half) as long
-  double another_gap = 0;     // rad, by windows or a torque that give another than `fit` beyond the errors
+  double another_gap =
+      0;  // rad, by windows or a torque whose gap differs from that of `fit` by more than the errors
   double least = 0, largest = 0;  // rad, play by any law of the deflection that the record does not rule out
   bool declared_law = true;
   // How it was read.

@@ -67,11 +67,11 @@ double noise_gain(bool of_torque, bool tachometer, double interval, std::size_t 
 double longest_average(const MomentumTransferSettings& s, double interval);
 /// Standard deviation of the noise of what is measured of the motion; at least that of its steps.
 double motion_noise(const Motor& motor);
-/// With the shortest averages that noise does not spoil; throws Refusal where all are spoilt.
+/// With the shortest averages in which F exceeds the noise; throws Refusal if there are none.
 Flank calm_flank(const Motor& motor, const MomentumTransferSettings& s);
 
-/// Share of the averaging time that an impact leaves over; 1 on a rigid flank. It lasts half a cycle of what
-/// is stopped on the flank, whose stiffness is that at its resting torque.
+/// Share of the averaging time that remains after an impact; 1 on a rigid flank. The impact lasts half a
+/// cycle of the stopped mass on the flank, with the flank's stiffness at its resting torque.
 double shortness_of_impacts(const Flank& flank, double interval, const MomentumTransferSettings& s);
 /// Crossings from flank to flank: |F| falls below half of its level, then F exceeds it on the other side.
 std::vector<Crossing> find_crossings(const Flank& flank, double shortness);

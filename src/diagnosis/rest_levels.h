@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Two encoders at rest on either flank: a record that holds a torque, lets go and holds another, with too few
-// moves for a fit. What motor and load differ by where a torque presses one flank, less what they differ by
-// where it presses the other or none, is the play and what the teeth yield by. Where none presses, the motor
-// has come to rest beyond its gap by the way it came; had it stopped short of the other flank the play would
-// be larger, which several such rests at one place speak against.
+// moves for a fit. Motor minus load while a torque presses one flank, less the same while it presses the
+// other flank or none, is the play plus the deflection of the teeth. If no torque presses the second flank,
+// it is assumed that the motor has crossed its gap before it stopped. Had it stopped short of the flank, the
+// play would be larger; several rests at one place make that unlikely.
 #pragma once
 
 #include <optional>
@@ -30,8 +30,8 @@ struct RestLevels {
 /// scatter by a fifth of their distance.
 std::optional<RestLevels> rest_levels(const TwoEncoders& motion);
 
-/// The distance under torque, of which the teeth yield a part (`deflection`, `components`). False where
-/// nothing stands still, or where the teeth alone may yield as much.
+/// The distance of the flanks under torque; `deflection` and `components` have the part that is deflection of
+/// the teeth. False if nothing stands still, or if the deflection of the teeth alone may be as large.
 bool read_at_rest(const TwoEncoders& motion, const PositionDifferenceSettings& settings, Estimate& estimate);
 
 }  // namespace backlash::diagnosis

@@ -7,9 +7,9 @@
 //   Jg qg'' = F rb - Ko qg - Co qg'          F = K d^1.5 max(0, 1 + 3/2 alpha d' + h d' / (|d'| + 1 mm/s)),
 //   d = |rb (qp - qg)| - gap
 //
-// with a free link instead of the locked output as in waveform.h. What a rig file may lack comes in beside
-// it (theory of each: model/terms): motor friction that falls with speed and grows with T, quadratic drag,
-// dry friction of the pinion, teeth of another exponent,
+// with a free link instead of the locked output as in waveform.h. Effects that a rig file may lack are added
+// (theory of each: model/terms): motor friction that falls with speed and grows with T, quadratic drag, dry
+// friction of the pinion, teeth of another exponent,
 //
 //   dry -> max(0, dry + s exp(-(qm' / (3 friction_speed))^2) + l |T|),  cm -> cm + q |qm'|
 //   F -> F (d / d0)^e

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the declared machine says before a record is fitted: scales of length, time and position, and how well
-// each value is known.
+// The priors of the declared machine: scales of length, time and position, and how well each value is known
+// before a record is fitted.
 #pragma once
 
 #include <vector>
@@ -18,7 +18,7 @@ constexpr int kQuantityPlaces[] = {kMotorDamping,    kDryFriction,   kFrictionSp
                                    kSensorGain,      kSensorLag,     kSensorTime};
 
 /// The shared values of a fit: those of the motion, then the logarithm of a factor that each has to its
-/// power in the symmetry of waveform.h. What the machine has not has the spread 0.
+/// power in the symmetry of waveform.h. Values of parts that the machine does not have get the spread 0.
 constexpr int kCommonScale = kGlobalValues, kSharedValues = kGlobalValues + 1;
 struct WaveformPriors {
   fit::Priors shared;
@@ -50,8 +50,8 @@ double waveform_position_swing(const WaveformData& data, bool locked);
 /// `lacking`: with what a rig file may lack, each as "nothing, give or take a typical share of the torque".
 WaveformPriors waveform_priors(const WaveformSettings& settings, const WaveformData& data, bool lacking);
 
-/// Least standard error of the logarithm of the gap from torque alone: by the symmetry of waveform.h the
-/// torque says nothing of the factor c, so that the priors alone hold it. Theory.
+/// Smallest possible standard error of the logarithm of the gap from torque alone: by the symmetry of
+/// waveform.h the torque does not determine the factor c, so that only the priors do. Theory.
 double waveform_symmetry_error(const WaveformPriors& priors);
 
 }  // namespace backlash::diagnosis

@@ -13,12 +13,12 @@ namespace backlash::diagnosis {
 /// What a channel leaves unexplained.
 struct WaveformMisfit {
   double rms = 0;        // of the residual, unit of the channel
-  double structure = 0;  // the same of its part that is surely no white noise
+  double structure = 0;  // the same for the part that is certainly not white noise
   double noise = 0;      // of the channel by itself, at most
   double swing = 0;      // of the channel
   double drive = 0;      // what noise of the torque that drives may leave
 
-  /// What is no noise of the channel, nor of the torque that drives.
+  /// The part that is neither noise of the channel nor of the driving torque.
   double left() const;
 };
 
@@ -36,7 +36,7 @@ struct WaveformSolution {
   WaveformPriors priors;
   double finest = kNaN;                // half width of the narrowest interval, in `unit`
   const char* unit = "m";              // of the gap
-  std::vector<double> left_of_spread;  // share of the prior spread that the record leaves, per value
+  std::vector<double> left_of_spread;  // posterior over prior spread, per value
   WaveformMisfit misfit[kWaveformChannels];
   int windows = 0, left_out = 0;
   bool lacking = false;       // the rig file lacks something of the machine

@@ -10,7 +10,7 @@
 
 namespace backlash::diagnosis {
 
-/// What was measured, and about which reversals it is looked at.
+/// The measured signals, and the reversals about which they are fitted.
 struct WaveformData {
   std::vector<double> time, drive, torque, position;  // s, N m, N m, rad; no position: torque alone
   double interval = 0;                                // s, usual, between samples

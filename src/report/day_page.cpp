@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -75,14 +76,43 @@ JointDay within(JointDay joint, double from, double to) {
   return joint;
 }
 
-bool lengths(const diagnosis::HistoryEntry& e) {
-  return std::isfinite(e.backlash) || std::isfinite(e.upper);
+/// All plays of a page are in one unit: lengths only if every play has one.
+bool lengths(const Day& day) {
+  for (const JointDay& joint : day.joints)
+    for (const diagnosis::HistoryEntry& e : joint.estimates)
+      if (has_play(e) && !std::isfinite(e.backlash) && !std::isfinite(e.upper)) return false;
+  return true;
 }
 
-/// "80.0 [78.2, 81.9] um", "< 5.1 um"; empty: none.
-std::string play_text(const diagnosis::HistoryEntry* e) {
+bool standing(const JointDay& joint) {
+  return std::any_of(joint.changes.begin(), joint.changes.end(), [](const diagnosis::KnownChange& c) {
+    return c.state == diagnosis::ChangeState::standing;
+  });
+}
+
+/// Of the verdict's colour and of the order of joints, the worst first.
+const char* const kGrades[] = {"stop", "service", "watch", "cannot_tell", "ungraded", "good"};
+
+/// Place in kGrades; a joint that has changed is one to watch, a silent one is not known.
+std::size_t severity(const JointDay& joint) {
+  const std::string grade = joint.estimates.empty() ? "cannot_tell" : joint.estimates.back().grade;
+  const auto place = std::size_t(std::find(std::begin(kGrades), std::end(kGrades), grade) - kGrades);
+  const std::size_t most = standing(joint) ? 2 : joint.silent_since ? 3 : 5;
+  return std::min(place, most);
+}
+
+/// "changed, watch", "good", "good, silent", "no estimate": what a reader looks for first.
+std::string state_text(const JointDay& joint) {
+  std::string grade = joint.estimates.empty() ? "no estimate" : joint.estimates.back().grade;
+  std::replace(grade.begin(), grade.end(), '_', ' ');
+  if (standing(joint))
+    grade = grade == "watch" || grade == "service" || grade == "stop" ? "changed, " + grade : "changed";
+  return grade + (joint.silent_since ? ", silent" : "");
+}
+
+/// "80.0 [78.2, 81.9] um", "< 5.1 um"; empty: none. `length`: along the line of action, else as an angle.
+std::string play_text(const diagnosis::HistoryEntry* e, bool length) {
   if (!e) return "";
-  const bool length = lengths(*e);
   const double unit = length ? 1e-6 : 1e-3, value = length ? e->backlash : e->backlash_angle;
   const double lower = length ? e->lower : e->angle_lower, upper = length ? e->upper : e->angle_upper;
   const char* const name = length ? "\u00b5m" : "mrad";
@@ -117,8 +147,9 @@ std::string count_text(const JointDay& joint, const PlayEstimates& found) {
 /// Why a joint has no entry at the end of the day, as far as the files show.
 std::string silence_text(const JointDay& joint, const Day& day) {
   if (!joint.silent_since) return "";
-  const bool all = std::all_of(day.joints.begin(), day.joints.end(),
-                               [](const JointDay& other) { return other.silent_since.has_value(); });
+  const bool all = std::all_of(day.joints.begin(), day.joints.end(), [](const JointDay& other) {
+    return other.silent_since.has_value() || other.estimates.empty();
+  });
   return fmt::format("nothing since {} ({:.1f} h): {}", utc_time(*joint.silent_since),
                      ((std::isnan(day.now) ? day.to : day.now) - *joint.silent_since) / 3600,
                      all ? "no diagnoser wrote, it had ended or got no sample"
@@ -153,14 +184,33 @@ Json joint_json(const JointDay& joint, const Day& day) {
   return json;
 }
 
+/// "Changed: wrist. Good: elbow, shoulder.", the worst first.
+std::string answer_of(const Day& day) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> groups;
+  for (std::size_t place = 0; place < std::size(kGrades); ++place)
+    for (const JointDay& joint : day.joints) {
+      if (severity(joint) != place) continue;
+      std::string state = state_text(joint);
+      state[0] = char(std::toupper(state[0]));
+      auto group =
+          std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == state; });
+      if (group == groups.end()) group = groups.emplace(groups.end(), state, std::vector<std::string>());
+      group->second.push_back(joint.joint);
+    }
+  std::string answer;
+  for (const auto& [state, names] : groups)
+    answer += (answer.empty() ? "" : " ") + state + ": " + joined(names) + ".";
+  return answer;
+}
+
 Json row_of(const JointDay& joint, const Day& day) {
   const PlayEstimates found = play_estimates(joint);
+  const bool length = lengths(day);
   Json row = {{"joint", joint.joint},
-              {"grade", joint.estimates.empty() ? "" : joint.estimates.back().grade},
-              {"first", play_text(found.first)},
-              {"last", play_text(found.last)},
+              {"state", state_text(joint)},
+              {"first", play_text(found.first, length)},
+              {"last", play_text(found.last, length)},
               {"estimates", count_text(joint, found)},
-              {"silence", silence_text(joint, day)},
               {"changes", Json::array()}};
   for (const diagnosis::KnownChange& c : joint.changes)
     row["changes"].push_back(change_text(c.found) + (c.state == diagnosis::ChangeState::ended ? ", over"
@@ -234,13 +284,24 @@ std::string day_json(const Day& day) {
 }
 
 std::string day_page(const Day& day, const Provenance& provenance) {
-  Json data = {{"summary", day_summary(day)},
+  std::size_t worst = std::size(kGrades) - 1;
+  for (const JointDay& joint : day.joints) worst = std::min(worst, severity(joint));
+  Json data = {{"grade", kGrades[worst]},
+               {"answer", answer_of(day)},
+               {"from", utc_time(day.from)},
+               {"to", utc_time(day.to)},
+               {"notes", Json::array()},
                {"joints", Json::array()},
                {"plots", plots_of(day)},
                {"warnings", warnings_section(day.warnings)},
                {"provenance", provenance_sections(provenance)}};
-  for (const JointDay& joint : day.joints) data["joints"].push_back(row_of(joint, day));
-  return report_page("A day of the joints, " + utc_date(day.to), filled(kDayTemplate, data));
+  for (const JointDay& joint : day.joints) {
+    data["joints"].push_back(row_of(joint, day));
+    for (const Json& change : data["joints"].back()["changes"])
+      data["notes"].push_back(joint.joint + ": " + change.get<std::string>());
+    if (joint.silent_since) data["notes"].push_back(joint.joint + ": " + silence_text(joint, day));
+  }
+  return report_page("Joints on " + utc_date(day.to), filled(kDayTemplate, data));
 }
 
 }  // namespace backlash::report

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 
@@ -53,15 +54,22 @@ Json play(const Answer& a, const PageUnit& unit) {
                                    : cell(a.backlash, a.lower, a.upper, unit.scale());
 }
 
-std::string parts_text(const diagnosis::PlayComponents& parts) {
+/// In the unit of the page, where the estimate relates angles to lengths.
+std::string parts_text(const diagnosis::PlayComponents& parts, const diagnosis::Estimate& of,
+                       const PageUnit& unit) {
+  const double length = unit.linear || unit.angle ? 1 : of.backlash / of.backlash_angle;  // per rad
+  const bool known_length = std::isfinite(length);
+  const double scale = known_length ? length / unit.scale() : 1 / kMilliradian;
+  const std::string name = known_length ? unit.name() : "mrad";
   std::vector<std::string> known;
-  const auto add = [&known](const char* name, double value, const char* unit) {
-    if (std::isfinite(value)) known.push_back(std::string(name) + " " + four_digits(value) + " " + unit);
+  const auto add = [&known](const char* what, double value, const std::string& in) {
+    if (std::isfinite(value)) known.push_back(std::string(what) + " " + four_digits(value) + " " + in);
   };
-  add("gap", parts.gap, "rad");
-  add("compliance", parts.compliance, "rad/(N m)");
-  add("Coulomb friction", parts.coulomb, "N m");
-  add("at torque", parts.at_torque, "N m");
+  const std::string torque = unit.linear ? "N" : "N m";
+  add("gap", scale * parts.gap, name);
+  add("compliance", scale * parts.compliance, name + (unit.linear ? "/N" : "/(N m)"));
+  add("Coulomb friction", parts.coulomb, torque);
+  add("at torque", parts.at_torque, torque);
   return joined(known);
 }
 
@@ -71,17 +79,38 @@ std::string headline(const diagnosis::Verdict& v, const PageUnit& unit) {
   const double value = angle ? v.backlash_angle : v.backlash;
   if (!std::isfinite(value)) return "";
   const double lower = angle ? v.angle_lower : v.lower, upper = angle ? v.angle_upper : v.upper;
-  std::string grade = diagnosis::to_string(v.grade);
-  grade[0] = char(std::toupper(grade[0]));
-  return fmt::format("{}: {} {unit} of backlash, 95 % interval {} to {} {unit}.", grade,
+  std::string grade;
+  if (v.grade != diagnosis::Grade::ungraded) {
+    grade = std::string(diagnosis::to_string(v.grade)) + ": ";
+    grade[0] = char(std::toupper(grade[0]));
+  }
+  return fmt::format("{}{} {unit} of backlash, 95 % interval {} to {} {unit}{}.", grade,
                      four_digits(value / unit.scale()), four_digits(lower / unit.scale()),
-                     four_digits(upper / unit.scale()), fmt::arg("unit", unit.name()));
+                     four_digits(upper / unit.scale()), grade.empty() ? "; no limits are stated" : "",
+                     fmt::arg("unit", unit.name()));
+}
+
+/// What the methods that looked at the record saw, if it shows no play; what the others lack stands in the
+/// table.
+Json why_not(const diagnosis::Diagnosis& diagnosis) {
+  Json reasons = Json::array();
+  for (const diagnosis::Estimate& e : diagnosis.estimates)
+    if (e.status != diagnosis::Status::insufficient_data) reasons.push_back(e.method + ": " + e.message);
+  if (reasons.empty())
+    reasons.push_back("no method can use this record; what each of them lacks stands below");
+  return reasons;
 }
 
 /// What the headline does not say: by which methods, and what contradicts them.
 std::string beside_headline(const std::string& message) {
   const std::size_t by = message.find(" by ");
   return by == std::string::npos ? message : "B" + message.substr(by + 2);
+}
+
+/// "insufficient data"
+std::string in_words(std::string id) {
+  std::replace(id.begin(), id.end(), '_', ' ');
+  return id;
 }
 
 Json estimates(const diagnosis::Diagnosis& diagnosis, const PageUnit& unit) {
@@ -91,19 +120,21 @@ Json estimates(const diagnosis::Diagnosis& diagnosis, const PageUnit& unit) {
     if (std::isfinite(e.skewness) && e.message.find("skewness") == std::string::npos)
       how = "skewness " + four_digits(e.skewness) + (how.empty() ? "" : "; ") + how;
     rows.push_back({{"method", e.method},
-                    {"status", diagnosis::to_string(e.status)},
+                    {"status", in_words(diagnosis::to_string(e.status))},
                     {"together", false},
                     {"play", play(e, unit)},
                     {"how", how},
-                    {"parts", e.components ? parts_text(*e.components) : ""}});
+                    {"parts", e.components ? parts_text(*e.components, e, unit) : ""}});
   }
   const diagnosis::Verdict& v = diagnosis.verdict;
   if (!v.members.empty())
     rows.push_back({{"method", "together"},
-                    {"status", diagnosis::to_string(v.grade)},
+                    {"status", in_words(diagnosis::to_string(v.grade))},
                     {"together", true},
                     {"play", play(v, unit)},
-                    {"how", v.agreement},
+                    {"how", v.agreement == "agree"    ? "the methods agree"
+                            : v.agreement == "single" ? "one method answers"
+                                                      : v.agreement},
                     {"parts", ""}});
   return rows;
 }
@@ -180,18 +211,31 @@ std::string diagnosis_page(const DiagnosisReport& report, const rig_file::RigFil
   const PageUnit unit = unit_of(report.diagnosis, rig && rig->rig.linear);
   const std::string of = report.rig.empty() ? report.record->name : report.rig + ", " + report.record->name;
   const diagnosis::Verdict& verdict = report.diagnosis.verdict;
-  const std::string first = headline(verdict, unit);
-  const Json data = {{"grade", diagnosis::to_string(verdict.grade)},
-                     {"headline", first},
-                     {"message", first.empty() ? verdict.message : beside_headline(verdict.message)},
-                     {"unit", unit.name()},
-                     {"estimates", estimates(report.diagnosis, unit)},
-                     {"plots", plots_of(report, rig)},
-                     {"has_machine", rig != nullptr},
-                     {"machine", machine(report, rig)},
-                     {"facts", facts(report)},
-                     {"warnings", warnings_section(report.warnings)},
-                     {"provenance", provenance_sections(provenance)}};
+  const bool silent = verdict.members.empty() && verdict.dissenters.empty();
+  const bool unknown = verdict.grade == diagnosis::Grade::cannot_tell;
+  const std::string first =
+      unknown ? "Cannot tell how much backlash the joint has." : headline(verdict, unit);
+  const Json values = machine(report, rig);
+  const auto any = [&values](const char* column) {
+    return std::any_of(values.begin(), values.end(), [&](const Json& row) { return row.at(column) != ""; });
+  };
+  const Json data = {
+      {"grade", diagnosis::to_string(verdict.grade)},
+      {"headline", first},
+      {"reasons",
+       silent ? why_not(report.diagnosis)
+              : Json::array({unknown || first.empty() ? verdict.message : beside_headline(verdict.message)})},
+      {"unit", unit.name()},
+      {"estimates", estimates(report.diagnosis, unit)},
+      {"plots", plots_of(report, rig)},
+      {"has_machine", rig != nullptr},
+      {"machine", values},
+      {"has_uncertainty", any("uncertainty")},
+      {"has_found", any("found")},
+      {"has_source", any("source")},
+      {"facts", facts(report)},
+      {"warnings", warnings_section(report.warnings)},
+      {"provenance", provenance_sections(provenance)}};
   return report_page("Backlash of " + of, filled(kDiagnosisTemplate, data));
 }
 

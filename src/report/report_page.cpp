@@ -49,6 +49,7 @@ std::string provenance_sections(const Provenance& p) {
   Json data = {
       {"rig", p.rig_text.empty() ? Json(nullptr) : Json{{"source", p.rig_source}, {"text", p.rig_text}}},
       {"files", Json::array()},
+      {"has_files", !p.files.empty()},
       {"version", version()},
       {"built_with", built_with()},
       {"seeds", p.seeds},

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <regex>
 #include <sstream>
 
 #include "backlash_diagnosis/base/text.h"
@@ -23,6 +24,22 @@ std::vector<std::string> comments_of(const std::string& text) {
     comments.push_back(mark == std::string::npos ? "" : std::string(trimmed(line.substr(mark + 2))));
   }
   return comments;
+}
+
+/// The unit at the beginning of a comment, up to "," or " [": "N m s/rad", "-"; empty where none is there.
+std::string unit_of_comment(const std::string& comment) {
+  static const std::regex unit(
+      "-|%|(m|mm|um|rad|deg|s|kg|N|A|V|Hz|Pa)(\\^[0-9.]+)?([ /](1|m|rad|s|kg|N|A|V|Hz)(\\^[0-9.]+)?)*");
+  const std::string begin = comment.substr(0, std::min(comment.find(','), comment.find(" [")));
+  return std::regex_match(begin, unit) ? begin : "";
+}
+
+/// What a comment says besides the unit that it begins with, without a bracket around all of it.
+std::string without_unit(const std::string& comment, std::size_t unit) {
+  std::string rest(trimmed(comment.substr(std::min(comment.size(), unit + (comment[unit] == ',')))));
+  if (rest.size() > 1 && rest.front() == '[' && rest.find(']') == rest.size() - 1)
+    rest = rest.substr(1, rest.size() - 2);
+  return rest;
 }
 
 std::string joined_path(std::vector<std::string> path) {
@@ -86,12 +103,15 @@ class Listing {
     v.uncertainty = std::move(uncertainty);
     v.source = std::move(source);
     const auto at = static_cast<std::size_t>(line) - 1;
-    if (at < comments_.size() && !comments_[at].empty())
-      v.source += (v.source.empty() ? "" : "; ") + comments_[at];
+    const std::string comment = at < comments_.size() ? comments_[at] : "";
+    const std::string unit = unit_of_comment(comment);
+    if (const std::string said = without_unit(comment, unit.size()); !said.empty())
+      v.source += (v.source.empty() ? "" : "; ") + said;
     const auto& places = known_places();
     const auto place =
         std::find_if(places.begin(), places.end(), [&path](const KnownPlace& p) { return p.path == path; });
     if (place != places.end()) fill_quantity(v, static_cast<std::size_t>(place - places.begin()));
+    if (v.unit.empty() && unit != "-") v.unit = unit;
     values.push_back(std::move(v));
   }
 

@@ -32,7 +32,7 @@ TEST(DeclaredValues, AsTheFileSaysWithItsSource) {
   EXPECT_EQ(v.value, 0.0048);
   EXPECT_EQ(v.unit, "N m s/rad");
   EXPECT_EQ(v.uncertainty, "30 %");
-  EXPECT_EQ(v.source, "sheet; N m s/rad [T2, last digit uncertain]");
+  EXPECT_EQ(v.source, "sheet; T2, last digit uncertain");
   EXPECT_EQ(v.quantity, 0);
 }
 
@@ -49,6 +49,21 @@ TEST(DeclaredValues, WaveformCountsHalfOfACoupling) {
   const DeclaredValue v = value_of(with("inertia: 0.0 ", "inertia: 4.0e-6 "), "pinion.inertia");
   EXPECT_EQ(v.value, 2.1e-5);
   EXPECT_EQ(v.share, 2e-6);
+}
+
+TEST(DeclaredValues, UnitsOfCommentsStandWithTheValue) {
+  const auto said = [](const std::string& comment) {
+    const DeclaredValue v =
+        value_of(with("m, pitch diameter 0.03175 m [T2] at a pressure angle of 20 deg [T2]", comment),
+                 "mesh.base_radius");
+    return v.unit + "|" + v.source;
+  };
+  EXPECT_EQ(said("m"), "m|");
+  EXPECT_EQ(said("m, at 20 deg"), "m|at 20 deg");
+  EXPECT_EQ(said("N m s/rad [T2] of [3]"), "N m s/rad|[T2] of [3]");
+  EXPECT_EQ(said("kg m^2 [sheet]"), "kg m^2|sheet");
+  EXPECT_EQ(said("-, turns"), "|turns");
+  EXPECT_EQ(said("measured in 2024, twice"), "|measured in 2024, twice");
 }
 
 /// Of all rig files of the house: every line of the gear train that holds a number alone is there.

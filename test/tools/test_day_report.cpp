@@ -80,6 +80,7 @@ TEST_F(DayReport, ChangesOfTheDayAreReported) {
   EXPECT_EQ(page["joints"][1]["changes"][0]["since"], kNoon - 5 * kHour);
   expect_contains(page["summary"].get<std::string>(), "wrist: backlash since 2027-01-01T07:00:00Z");
   expect_contains(read("day.html"), "backlash since 2027-01-01T07:00:00Z");
+  expect_contains(read("day.html"), "<b>Changed, watch: wrist. Good: elbow.</b>");
   // It began after that day.
   EXPECT_EQ(day(1, "--until 2027-01-01T06:00:00Z")["joints"][1]["changes"].size(), 0u);
 }
@@ -100,6 +101,7 @@ TEST_F(DayReport, SinceWhenNothingWasReported) {
   const std::string text = "nothing since " + utc_time(now - 5 * kHour) + " (5.0 h): no diagnoser wrote";
   expect_contains(all["summary"].get<std::string>(), text);
   expect_contains(read("day.html"), text);
+  expect_contains(read("day.html"), "<p class=\"verdict cannot_tell\"><b>Good, silent: elbow.</b>");
   history("wrist", "good", 0.5, now);
   const Json one = day(0, "");
   expect_contains(one["joints"][0]["silence"].get<std::string>(), "no sample of this joint");

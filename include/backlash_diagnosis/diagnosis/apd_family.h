@@ -31,10 +31,10 @@ Quantiles quantiles_of(std::vector<double> samples);
 /// Quantile function of the same signal plus independent normal noise of standard deviation sigma >= 0.
 Quantiles with_noise(const Quantiles& exact, double sigma);
 
-/// What simulated records with a backlash between two neighbouring values of the family taught. A record
+/// Calibration from simulated records with a backlash between two neighbouring values of the family. A record
 /// accepts a backlash b where T(b) <= T_min + threshold max(T_min, floor), T_min its smallest distance.
 struct FamilySegment {
-  double floor = 0;               // T of noise-free records: what interpolation and irregular motion leave
+  double floor = 0;               // T of noise-free records, by interpolation and irregular motion
   std::vector<double> threshold;  // per noise level: 95 % of the records accept their own backlash
   std::vector<double> misfit;     // per noise level: largest root of T_min among the records
 };

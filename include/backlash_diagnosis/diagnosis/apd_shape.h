@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Backlash from the whole APD: which member of the rig's family of distributions a record resembles most.
 //
-// Where skewness is one number of the APD, its shape keeps apart what skewness confuses: the curve may be
-// flat or rise while the distribution still changes. Needs the signal of the curve and a curve with its
-// family; see apd_family.h for the distance and how the 95 % interval is calibrated.
+// Skewness is one number of the APD; the whole shape distinguishes more: it still changes where the curve of
+// skewness is flat or rises. Needs the signal of the curve and a curve with its family; see apd_family.h for
+// the distance and how the 95 % interval is calibrated.
 #pragma once
 
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What has changed of a joint, reported once: looks at overlapping stretches of its record find the same
-// change again and again, sharper or less sharp, and no look sees one that began before its stretch. Knows
-// stretches and what was found in them, not how.
+// The changes of a joint, each reported once. Looks at overlapping stretches of its record find the same
+// change several times, more or less precisely, and no look sees a change that began before its stretch. The
+// ledger knows stretches and findings, not how they were found.
 //
-// How often a healthy joint is called changed. A look at `length` seconds may find something by chance with
-// rate * length; looks each `interval` seconds therefore get the rate that rate_of_look() says, and the sum
-// over all looks is the rate that was asked for, however much they overlap (Bonferroni). That a change counts
-// only when a second look finds it again makes it less.
+// How often a healthy joint is called changed. A look at `length` seconds finds something by chance with the
+// probability rate * length. Looks each `interval` seconds therefore get the rate of rate_of_look(), so that
+// the sum over all looks is the wanted rate, however much they overlap (Bonferroni). As a change counts only
+// if a second look finds it again, the true rate is lower.
 #pragma once
 
 #include <optional>

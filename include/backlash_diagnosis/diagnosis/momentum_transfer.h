@@ -27,11 +27,11 @@
 // of the motor alone: without motor_torque a square wave without offset is estimated from the motion. Its
 // period is that of the motion; it switches where, before most crossings of the middle, the acceleration
 // jumps; its level is the one that leaves least torque on the flank in flight and least beside it at rest.
-// What it gives must not contradict the places where the motor rests. Any other torque is refused, mostly as
-// no phase of the period begins the crossings. The level that is estimated takes up what is wrong with the
-// declared inertia, and a constant friction: free flight then says less of the machine than with a recorded
-// torque. Of 400 simulated rigs of Sarkar's with half gaps up to 100 um, 358 answers, 98 % of the intervals
-// right, none off by half of its width.
+// The result must not contradict the places where the motor rests. Any other torque is refused, mostly
+// because the crossings do not begin at one phase of the period. The estimated level absorbs an error of the
+// declared inertia, and a constant friction, so free flight then tests the machine less sharply than with a
+// recorded torque. Of 400 simulated rigs of Sarkar's with half gaps up to 100 um, 358 answers, 98 % of the
+// intervals right, none off by half of its width.
 //
 // Needs motor_velocity (or motor_position, differentiated), and motor_torque but for a square wave; the motor
 // side must change flanks (square-wave or alternating torque), and the load must be locked, or load_position
@@ -45,9 +45,9 @@
 // coverage in simulations, see test_rig_estimators.cpp. Of a free load the dry friction is not the declared
 // one but that which leaves nothing in flight, and the flanks may yield by any law between the declared one
 // and Hertz's, as stiff as declared (tangent) at the torque that the flanks exceed for a twentieth of the
-// time: the middle is taken, both ends are in the interval. Where crossings of a free load scatter, what
-// makes them differ may shift all of them: their whole scatter is in the interval, not that of the median
-// alone. Each value of the file that `spread` says is uncertain is moved by one standard deviation to either
+// time: the middle of both is taken, and the interval contains both. If the crossings of a free load scatter,
+// their cause may also shift all of them: the interval contains their whole scatter, not only that of the
+// median. Each value of the file that `spread` says is uncertain is moved by one standard deviation to either
 // side and the record read again: 1.96 times the larger change of the median is in the interval. Of 42
 // answers about rigs of Sarkar's kind whose values were all other than declared 16 intervals missed without.
 #pragma once

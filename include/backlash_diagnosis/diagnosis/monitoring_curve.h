@@ -60,13 +60,13 @@ class MonitoringCurve {
   std::optional<ApdFamily> family;   // at the same backlash values; for apd_shape
   /// Standard deviations within which 95 % of simulated records lie about the curve; normal by default.
   double coverage_factor = 1.959964;
-  /// What the rig file leaves open of the machine; none of a rig whose machine the file takes as known.
+  /// What the rig file leaves unknown of the machine; none if the file states it as known.
   std::optional<DeclaredSpread> spread;
   double backlash_to_angle = kNaN;  // rad (at the axis of motor_position) per unit of backlash
 
-  /// Marks points that rise, and widens the scatter of all points by what runs in the middle between two
-  /// points teach (middle[i][level] lies between points i and i + 1): their own scatter, and how far they are
-  /// from the straight line, which is structure that the grid does not resolve. Called once by the builder.
+  /// Marks points that rise, and widens the scatter of all points from runs half way between them
+  /// (middle[i][level] lies between points i and i + 1): by their own scatter, and by their distance from the
+  /// straight line, which is structure that the grid does not resolve. Called once by the builder.
   void finish(const std::vector<std::vector<SkewnessCell>>& middle);
 
   /// Skewness model at any backlash within the curve and any noise (held constant outside the levels).

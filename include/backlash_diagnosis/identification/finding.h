@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the procedures find, in one form, so that they can be put together: a linear combination of parameters
+// The results of all procedures in one form, so that they can be combined: a linear combination of parameters
 // has a value.
 #pragma once
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How well one model or another says what a record shows, as in Chapter 6 of Yumrukcal (2013): speed
-// difference and position difference between motor and load, for a mesh without gap, with a constant one,
-// with one that varies with the load position.
+// How well several models predict a record, as in Chapter 6 of Yumrukcal (2013): speed difference and
+// position difference between motor and load, for a mesh without gap, with a constant one, with one that
+// varies with the load position.
 //
 // Two ways of driving a model:
 //   followed   its load is driven by the recorded motor position through the whole record (output_error.h):

@@ -21,7 +21,7 @@ struct PowerContact {
   double damping = 0;          // N s/m
 };
 
-/// Name and parameters of a law, to create it again with other values.
+/// Name and parameters of a law, from which it can be created again, also with other values.
 struct ContactSpec {
   std::string law;
   ParameterValues values;
@@ -38,17 +38,17 @@ class ContactLaw {
 
   /// Force at penetration d > 0; callers handle d <= 0 (no contact, no force). `impact_speed` [m/s] is the
   /// approach speed d' > 0 at the touch that began this contact, 0 if none did (the flanks overlapped from
-  /// the start); only a law that says so below reads it.
+  /// the start); only laws with needs_impact_speed() read it.
   virtual double force(double penetration, double rate, double impact_speed) const = 0;
 
   /// Whether touches must be found and their speed kept.
   virtual bool needs_impact_speed() const { return false; }
 
-  /// Coefficient of restitution by which the speeds jump at a touch; none where the force alone acts. A law
-  /// that jumps needs the impact speed.
+  /// Coefficient of restitution by which the speeds jump at a touch; none for laws that act by their force
+  /// alone. A law that jumps needs the impact speed.
   virtual std::optional<double> jump_restitution(double /*impact_speed*/) const { return std::nullopt; }
 
-  /// The same law in numbers, where it is of this form.
+  /// The same law as coefficients of PowerContact, if it has this form.
   virtual std::optional<PowerContact> power_contact() const { return std::nullopt; }
 
   /// Elastic energy at penetration d >= 0: the integral of the force at rest [J].

@@ -53,7 +53,7 @@ struct GearGeometry {
   /// involute of the mate (interference), pointed teeth. Then no length of contact above holds for real
   /// teeth.
   std::vector<std::string> faults;
-  /// What a maker should know: teeth that a rack as deep as the mate would undercut.
+  /// Remarks for whoever makes the gears: teeth that a rack as deep as the mate would undercut.
   std::vector<std::string> remarks;
 
   double pinion_backlash_angle() const { return backlash / pinion.base_radius; }  // rad, the gear held

@@ -10,16 +10,15 @@
 // Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its
 // neighbours one body, so does a rigid mesh; a locked link has q_L = 0. F_M and F_L are dry friction with
 // sticking, see StickSlip; a braked motor sticks whatever the torque. Terms may shift either flank by an
-// opening o(q_M, q_L, torque); then its penetration is side x - backlash / 2 - r o, and the mesh torque acts
-// on both ends through the slopes of o, so that no energy is lost or gained (but see terms that follow the
-// torque).
+// opening o(q_M, q_L, torque). Its penetration is then side x - backlash / 2 - r o, and the mesh torque acts
+// on both ends also through the slopes of o. This conserves energy unless o depends on the torque.
 //
-// Where mesh and couplings are rigid, what terms take for the torque through the teeth is what the load
-// takes,
-//   T = J a - terms on the load        J of gear and link; where the file gives them none, of all of it
-// without friction of its own. Friction may follow it (T and friction are found together), smooth torques may
-// not. After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute instead of relative
-// coordinates.
+// If mesh and couplings are rigid, the teeth do not appear in the equations. Terms that depend on the torque
+// through the teeth then get the torque that the load takes,
+//   T = J a - terms on the load        J of gear and link; of the whole body if they have none in the file
+// without dry friction of the load. Friction may depend on it (T and friction are solved for together),
+// smooth torques may not. After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute
+// instead of relative coordinates.
 #pragma once
 
 #include <array>
@@ -37,14 +36,14 @@ struct AppliedTorque {
   double motor, load;
 };
 
-/// What can be seen of a gear train at one moment, in the units of its records (see Rig::motor_side).
+/// What sensors would show of a gear train at one moment, in the units of its records (see Rig::motor_side).
 struct Observation {
   double motor_torque, motor_position, motor_velocity;
   // N m, of the input coupling: its spring (an ideal strain gauge), or spring and damper (T_I) where the rig
   // says so; NaN if rigid
   double sensor_torque;
   double sensor_twist, sensor_twist_rate;  // rad, rad/s, twist of the input coupling; NaN if rigid
-  double load_position, load_velocity;     // as a load encoder of wrong scale shows them (Sensing)
+  double load_position, load_velocity;     // with the scale error of the load encoder (Sensing)
   double output_torque;  // N m, at the load, spring torque of the output coupling; NaN if rigid
   double
       motor_current;  // A, motor_torque / torque constant: an ideal current control; NaN without the constant
@@ -68,42 +67,43 @@ class GearTrain : private TrainParts {
   /// `t` [s] matters only to terms that depend on time.
   Observation observe(const double* state, AppliedTorque applied, double t = 0) const;
 
-  /// What moves the two ends, without their dry friction.
+  /// Torques on the two ends, without their dry friction.
   struct EndForces {
     double motor, load;    // N m, sum of all other torques
     double mesh_torque;    // N m, through the teeth, > 0 drives the load forward
     EndFriction friction;  // where both ends are one body, all of it at the motor
   };
   EndForces end_forces(double t, const double* state, AppliedTorque applied) const;
-  /// What acts on the load alone, whose motor moves as recorded: of a train with rigid couplings and a mesh
-  /// that gives way, with only the terms that move the load. The mesh torque in `motion` does not count.
+  /// Torques on the load while the motor moves as recorded. For a train with rigid couplings and an elastic
+  /// mesh; of the terms only those that move the load. The mesh torque in `motion` is not read.
   struct LoadForces {
     double net;            // N m on the link, without dry friction
     double mesh_torque;    // N m, through the teeth, > 0 drives the load forward
-    double mesh_on_motor;  // N m, of the teeth; its negative unless terms shape the flanks
+    double mesh_on_motor;  // N m, of the teeth; -mesh_torque unless terms shift the flanks
     FrictionLimits friction;
   };
   LoadForces load_forces(const Motion& motion) const;
-  /// Whether that is dampers, teeth without memory or shape, and friction that does not change: then
-  /// equations() with power_contact() and the limits at any moment are all of it.
+  /// Whether load_forces() consists of dampers, teeth whose force depends on penetration and rate alone, and
+  /// constant friction. Then equations() with power_contact() and the friction limits of any moment say all
+  /// of it.
   bool plain_load() const {
     return power_contact() && !contact_->needs_impact_speed() && !variation_ && !pairs_ && !shaped_ &&
            load_terms_.empty();
   }
 
-  /// The shift of either flank at these positions, forward flank first; infinite for a flank that is far
-  /// away. Saves time where forces are computed several times at nearly the same position. Only if terms act
-  /// on the flanks and none shapes them by the torque.
+  /// The shift of either flank at these positions, forward flank first; infinite for a flank that is too far
+  /// away to touch. Saves time if forces are computed several times at nearly the same position. Only if
+  /// flanks_shift_with_position().
   using Flanks = std::array<FlankShift, 2>;
   bool flanks_shift_with_position() const { return shaped_ && !shape_follows_torque_; }
   Flanks flanks(double motor_position, double load_position) const;
   LoadForces load_forces(const Motion& motion, const Flanks& flanks) const;
 
-  /// N m: what the load of one body takes at this acceleration [rad/s^2], the T above.
+  /// N m: the torque T above that the load takes at this acceleration [rad/s^2], of a rigid train.
   double torque_of_load(const Motion& motion, double acceleration) const;
 
-  /// What acts on the motor with rigid couplings beside mesh and motor torque; where the link is one body
-  /// with it, on both.
+  /// Torques on the motor other than mesh and motor torque, with rigid couplings; on motor and link together
+  /// if they are one body.
   struct MotorForces {
     double net;  // N m, without dry friction
     FrictionLimits friction;
@@ -113,8 +113,8 @@ class GearTrain : private TrainParts {
   double motor_inertia() const { return inertia_[layout_.node[kMotor]]; }
   double load_inertia() const;
 
-  /// Whether nothing acts but springs, dampers and teeth without memory: then equations() with the force of
-  /// the contact law is all of it.
+  /// Whether nothing acts but springs, dampers and teeth without memory: equations() with the force of the
+  /// contact law is then the whole model.
   bool smooth() const { return smooth_; }
   const EquationsOfMotion<double>& equations() const { return equations_; }
   std::optional<PowerContact> power_contact() const {
@@ -123,15 +123,16 @@ class GearTrain : private TrainParts {
   const TrainLayout& layout() const { return layout_; }
   double ratio() const { return ratio_; }  // load-side torque per torque of the records
 
-  /// Kinetic plus elastic energy (couplings, contact) [J], without terms and without what a flank stores that
-  /// gives way under its torque or that a term adds to its contact law.
+  /// Kinetic plus elastic energy (couplings, contact) [J]. Not included: terms, flanks that shift under their
+  /// torque, and forces that a term adds to the contact law.
   double energy(const double* state) const;
 
-  /// Power that the dampers of motor, couplings and link take out [W]; contact damping is not among them.
+  /// Power dissipated by the dampers of motor, couplings and link [W], without that of contact damping.
   double damping_power(const double* state) const;
 
-  /// Twist between motor and link under a static torque in one contact, without the gap. Torque and angle in
-  /// the units of motor_torque and motor_position; odd in torque. With the mean stiffness of the mesh cycle.
+  /// Twist between motor and link under a static torque with one flank pressed, without the gap. Torque and
+  /// angle in the units of motor_torque and motor_position; odd in torque. With the mean stiffness of the
+  /// mesh cycle.
   double elastic_deflection(double motor_torque) const;
 
   /// Total free play [m] (angular mesh: [rad] at the load side), >= 0; takes effect at the next derivative().
@@ -145,27 +146,27 @@ class GearTrain : private TrainParts {
   bool needs_touches() const { return contact_ && contact_->needs_impact_speed(); }
   static constexpr int kContactEvents = 4;
   void contact_events(const double* state, double* values) const;
-  /// Forgets the last touch. A flank that is closed to within rounding and approaches is a touch; one that is
-  /// inside is a contact that no touch began.
+  /// Forgets the last touch. A flank at its surface (to rounding) that approaches is a touch; one that
+  /// already penetrates is in contact with impact speed 0.
   void begin_contact(double* state);
-  /// A touch keeps the approach speed, and where the law says so the speeds in `state` jump. True where
-  /// integration must start again, because derivative or state have changed.
+  /// Keeps the approach speed of a touch; the speeds in `state` jump if the law says so. True if integration
+  /// must start again because derivative or state have changed.
   bool update_contact(double* state);
   double impact_speed() const { return impact_speed_; }  // m/s at the last touch, 0 if there was none
 
   /// Dry friction: the caller also reports where a body begins to stick or to slide. begin_friction() after
   /// the state was set (it forgets where bodies turned last); update_friction() each time the torque jumps or
-  /// one of the friction_event_count() values rises through 0. Where it returns true integration must start
+  /// one of the friction_event_count() values rises through 0. If it returns true, integration must start
   /// again.
   int friction_event_count() const { return static_cast<int>(dry_ends_.size()); }
   void friction_events(double t, const double* state, AppliedTorque applied, double* values) const;
   void begin_friction(double t, double* state, AppliedTorque applied);
   bool update_friction(double t, double* state, AppliedTorque applied);
-  /// Time [s] in which the fastest body on the spring of presliding friction swings by 1 rad of its period;
-  /// infinite where none moves. Steps above it pass over turns of a motion that is smaller than the solver's
-  /// tolerance.
+  /// 1 / w [s] of the fastest oscillation w [rad/s] of a body on the spring of presliding friction; infinite
+  /// if none moves. Longer steps would miss reversals of motions smaller than the solver's tolerance.
   double presliding_time(double t, const double* state, AppliedTorque applied) const;
-  /// Puts each body that sticks where it came to rest: a solver's interpolation moves it by roundings.
+  /// Puts each body that sticks back to where it came to rest, as a solver's interpolation moves it by
+  /// rounding errors.
   void hold(double* state) const;
   bool any_stuck() const;
   /// Holds the motor from now on; before begin_friction().

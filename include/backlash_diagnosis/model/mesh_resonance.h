@@ -8,16 +8,16 @@
 
 namespace backlash::model {
 
-/// Hz: sqrt(k (1 / J_M + 1 / J_L)) / 2 pi, of a locked link sqrt(k / J_M) / 2 pi, with the stiffness k of
-/// closed teeth at rest under `torque` [N m] > 0 (of a linear law the same under any). 0 for a rigid mesh.
-/// `rig` is of the load side.
+/// Hz: sqrt(k (1 / J_M + 1 / J_L)) / 2 pi, of a locked link sqrt(k / J_M) / 2 pi, with the tangent stiffness
+/// k of the mesh under the static `torque` [N m] > 0 (which a linear law does not depend on). 0 for a rigid
+/// mesh. `rig` has its values at the load side (load_side()).
 double mesh_resonance(const Rig& rig, double torque);
 
-/// Hz: that of config/two_inertia_servo.yaml, on whose records the bands of fits were tried (simulation).
-/// Bands of other machines are as far from their own resonance.
+/// Hz: mesh resonance of config/two_inertia_servo.yaml, on whose simulated records the frequency bands of
+/// fits were chosen. Bands of another machine are in the same ratio to its own resonance.
 constexpr double kTriedResonance = 44.2425;
 
-/// N m: root mean square, the usual torque that a mesh is under.
+/// N m: root mean square of `torque`, taken as the typical load of the mesh.
 double usual_torque(const std::vector<double>& torque);
 
 }  // namespace backlash::model

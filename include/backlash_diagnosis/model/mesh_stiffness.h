@@ -10,7 +10,7 @@
 //
 // Laws of k_pair:
 //
-// step: K = pi E L / (4 (1 - nu^2)), alike over a pair's life. Hertz contact of two cylinders alone,
+// step: K = pi E L / (4 (1 - nu^2)), constant while the pair touches. Hertz contact of two cylinders alone,
 // linearised by Yang and Sun (1985); one pair K, two pairs 2 K: Sarkar, Ellis and Moore (1997), Sections 3.2
 // and 4.1. Tooth bending is left out, which makes it some ten times too stiff.
 //
@@ -43,9 +43,9 @@ struct MeshStiffnessSettings {
   double face_width = 0;      // m, > 0; stiffness is proportional to it
   double youngs_modulus = 0;  // Pa, > 0, of both gears
   double poisson_ratio = 0;   // 0 to 0.5, of both gears
-  /// Travel over which a pair takes up or hands over its load, in base pitches, 0 to 0.5, centred on the
-  /// first and last touch of rigid teeth (cubic, smooth to the first derivative). 0: at once, a jump of the
-  /// stiffness that an integrator finds only by its error control.
+  /// Travel over which a pair takes up or gives off its load, in base pitches, 0 to 0.5, centred on the first
+  /// and last touch of rigid teeth (cubic, continuous first derivative). 0: at once; an integrator notices
+  /// that jump of the stiffness only by its error control.
   double transition = 0;
 };
 

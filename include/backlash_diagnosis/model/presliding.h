@@ -6,12 +6,12 @@
 //
 // x [rad] path since the reversal, F against the present motion, F_0 its value at the reversal, F_c what it
 // tends to, x_s the presliding distance. Continuous, independent of rate; a body at rest is held by it as by
-// a spring of at most 2 F_c / x_s, from rest without load F_c / x_s. Where F_c changes on the way (other
-// terms) the present one counts, as if it had been so since the reversal.
+// a spring of at most 2 F_c / x_s, from rest without load F_c / x_s. If F_c changes on the way (by other
+// terms), its present value is used for the whole way since the reversal.
 //
 // With a damping s [N m s/rad] of the bristles the body feels F + s w (1 - F / F_c), w [rad/s] its speed: the
 // friction of LuGre (Canudas de Wit, Olsson, Astrom and Lischinsky 1995, IEEE Trans. Autom. Control 40:419,
-// Eqs. 3 to 5, with their sigma_0 = F_c / x_s, sigma_1 = s). It never drives, as F stays within its limits.
+// Eqs. 3 to 5, with their sigma_0 = F_c / x_s, sigma_1 = s). This friction never drives, as |F| <= F_c.
 #pragma once
 
 #include <vector>
@@ -25,11 +25,11 @@ class Presliding {
  public:
   explicit Presliding(double position = 0, double friction = 0) : position_(position), friction_(friction) {}
 
-  /// Friction [N m], > 0 against forward motion, at `position` [rad] on the way in this direction (+1, -1;
-  /// 0: as it was at the turn). Needs limits.presliding > 0.
+  /// Friction [N m], > 0 against forward motion, at `position` [rad] while moving in this direction (+1, -1;
+  /// 0: the value at the reversal). Needs limits.presliding > 0.
   double friction(int direction, const FrictionLimits& limits, double position) const;
 
-  /// With what the bristles damp at `rate` [rad/s], which is in this direction.
+  /// The same with the damping of the bristles at `rate` [rad/s], whose sign is `direction`.
   double friction(int direction, const FrictionLimits& limits, double position, double rate) const;
 
  private:
@@ -39,10 +39,10 @@ class Presliding {
 /// The same along a recorded motion: friction [N m] of each sample, > 0 against forward motion, from a start
 /// without load. Limits without presliding give Coulomb friction.
 ///
-/// The sign of a rate [rad/s] gives the direction (0: as before), its size the damping. With the interval [s]
-/// it also gives where between two samples the body turned; without (0) the body turned at the sample before.
-/// Noise dithers friction away: both columns are to be smooth to within a small part of x_s. Columns of equal
-/// length, or InvalidParameter.
+/// The sign of a rate [rad/s] is the direction (0: as before), its size gives the damping. With `interval`
+/// [s] > 0 the place of a reversal between two samples follows from the rates; with 0 it is the earlier
+/// sample. Noise on the columns looks like reversals and makes friction too small: both must be smooth to a
+/// small fraction of x_s. Throws InvalidParameter for columns of different length.
 std::vector<double> presliding_friction(const std::vector<double>& positions,
                                         const std::vector<FrictionLimits>& limits,
                                         const std::vector<double>& rates, double interval = 0);

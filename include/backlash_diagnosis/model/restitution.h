@@ -5,9 +5,9 @@
 // Two bodies of reduced mass m meet at speed v [m/s] with F = K d^n (1 + D d'/v), D >= 0 [-]. They part at
 // e v, and
 //   D (1 + e) = ln((1 + D) / (1 - e D))                                                              (exact)
-// whatever m, K and n are, because m d' dd' = -F dd is separable: compression from v to 0 and restitution
-// from 0 to e v reach the same depth (for the force of Sarkar, Ellis and Moore 1997, Section 4.2). 0 < e <=
-// 1; e = 1 for D = 0, e < 1 / D, e -> 0 as D grows.
+// whatever m, K and n are, because m d' dd' = -F dd is separable, and compression (d' from v to 0) and
+// restitution (d' from 0 to -e v) have the same largest depth (for the force of Sarkar, Ellis and Moore 1997,
+// Section 4.2). 0 < e <= 1; e = 1 for D = 0, e < 1 / D, e -> 0 as D grows.
 #pragma once
 
 namespace backlash::model {

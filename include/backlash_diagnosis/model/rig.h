@@ -54,7 +54,7 @@ struct Mesh {
 
   bool angular() const { return std::isnan(base_radius); }
   double lever() const { return angular() ? 1 : base_radius; }  // m (or 1): torque per contact force
-  /// m (angular: rad), a whole turn: what is said to be so large is no play between teeth.
+  /// m (angular: rad), one turn: an upper limit for a declared backlash.
   double most_backlash() const { return 2 * M_PI * lever(); }
   const ContactSpec& contact_spec() const;  // what `contact` was made of; empty without one
 };
@@ -77,14 +77,15 @@ struct Rig {
   bool link_locked = false;
   Mesh mesh;
   std::vector<std::shared_ptr<const Term>> terms;
-  /// s, by which load_position and load_velocity of a record are later than motor_position: > 0, and the load
-  /// encoder shows q_L(t - skew). `sensors: encoder_skew` of the rig file.
+  /// s, by which load_position and load_velocity of a record are later than motor_position: the load encoder
+  /// shows q_L(t - skew). `sensors: encoder_skew` of the rig file.
   double encoder_skew = 0;
-  /// Other axes move as well and are not in the record: motor_torque holds their coupling, and no model of
-  /// this axis predicts it. `gear_train: coupled` of the rig file.
+  /// Other axes move too and are not in the record: motor_torque contains their reaction, which no model of
+  /// this axis predicts. `gear_train: coupled` of the rig file.
   bool coupled = false;
 
-  /// Load-side angle (or torque, divided) to the axis of motor_position: reduction ratio or 1.
+  /// Factor from a load-side angle to one on the axis of motor_position (torques are divided by it):
+  /// reduction ratio or 1.
   double motor_axis_ratio() const { return motor_side ? reduction_ratio : 1; }
 
   /// Backlash along the line of action [m] (or load-side angle [rad] for an angular mesh) to the angle on the
@@ -92,14 +93,15 @@ struct Rig {
   double backlash_angle(double backlash) const { return backlash / mesh.lever() * motor_axis_ratio(); }
 };
 
-/// Whether all members are equal; NaN equals NaN. Contact laws and terms are equal that were made from the
-/// same values; of others, of stiffness variations and tooth pairs, only the same object is.
+/// Whether all members are equal; NaN equals NaN. Contact laws and terms are equal if they were made from the
+/// same values. Laws that were not made by the registry, stiffness variations and tooth pairs are equal only
+/// if they are the same object.
 bool operator==(const Body& a, const Body& b);
 bool operator==(const Coupling& a, const Coupling& b);
 bool operator==(const Mesh& a, const Mesh& b);
 bool operator==(const Rig& a, const Rig& b);
 
-/// Whether it is a motor, a gap and a free link with nothing elastic beside the teeth.
+/// Whether the rig is a motor and a free link with a gap between them, and only the teeth are elastic.
 bool has_two_inertias(const Rig& rig);
 
 /// The same machine with all values at the load side of the reduction.
@@ -110,7 +112,7 @@ Rig load_side(const Rig& rig);
 /// file, line, key, value and limit.
 Rig read_rig(const YamlReader& yaml);
 
-/// The driver alone: the teeth never touch.
+/// The rig with a backlash so large that the teeth never touch: the drive alone.
 Rig without_load(Rig rig);
 
 }  // namespace backlash::model

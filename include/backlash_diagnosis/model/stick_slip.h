@@ -8,9 +8,8 @@
 // is decided again. Infinite friction is a brake: it stops a body at once (Karnopp 1985, ASME J. Dyn. Syst.
 // Meas. Control 107:100, with the zero of the speed found as an event instead of his interval of speeds).
 //
-// Where friction has a presliding distance (Presliding) it goes on from what it is where the speed crosses
-// zero. Such a body sticks only where it is at rest with all torques in balance to a millionth of its
-// friction.
+// Friction with a presliding distance (Presliding) is continuous where the speed crosses zero. Such a body
+// sticks only if it is at rest and its torques are in balance to a millionth of its friction.
 #pragma once
 
 #include "backlash_diagnosis/model/presliding.h"
@@ -30,14 +29,15 @@ class StickSlip {
     return direction_ == 0 ? 0 : direction_ > 0 ? -limits.forward : limits.backward;
   }
 
-  /// A value that rises through 0 where the mode ends.
+  /// A value that rises through 0 at the moment when the body begins to slide or comes to rest.
   double event(double net, double speed, const FrictionLimits& limits) const;
 
   /// Decides the mode from the body's speed [rad/s] and sets a speed that has just crossed zero to zero. True
   /// where mode or speed have changed.
   bool update(double net, double& speed, const FrictionLimits& limits, double position = 0);
 
-  /// The mode of a body that did not come here by motion. With presliding, friction begins without load.
+  /// Sets the mode of a body at the start of a simulation, or after its state was set. Presliding friction
+  /// begins at 0.
   void begin(double net, double& speed, const FrictionLimits& limits, double position = 0);
 
  private:

@@ -11,9 +11,8 @@
 //   reverse phase = 2 c - phase,  2 c = (s rb / rw + 2 g) / pb
 //
 // (a tooth centred on the line of centres has passed the pitch point by s rb / (2 rw) with either flank).
-// The factor is the one the pinion's position asks for, whatever the load; the small work that the changing
-// stiffness does on the teeth in contact is that of parametric excitation, so elastic energy is not
-// conserved.
+// The factor depends on the pinion's position alone and not on the load. A stiffness that changes under load
+// does work on the teeth in contact (parametric excitation), so elastic energy is not conserved.
 #pragma once
 
 #include <memory>
@@ -58,7 +57,7 @@ class StiffnessVariation {
 ///   youngs_modulus [Pa], poisson_ratio
 ///                for hertz_bending only; in the other laws they cancel, as the face width does
 ///
-/// The gear pair says how its teeth meet. The play of the rig is that of mesh.backlash (or half_gap), which
+/// The gear pair only determines how its teeth meet. The play is that of mesh.backlash (or half_gap), which
 /// wear and set_backlash() change. Throws BadData, also where the gear's base radius differs from the rig's
 /// by more than 0.1 %.
 MeshCycle read_mesh_cycle(const YamlReader& yaml, double base_radius);

@@ -2,8 +2,8 @@
 // An effect is a term of the model: a torque on the motor or the load, dry friction, a change of the shape or
 // stiffness of the flanks, or an error of a sensor.
 //
-// A new effect: one file in src/model/terms/ with its equation, and one line in term.cpp. Where it says what
-// to try (TermSearch), the search for what a model lacks tries it with all the others.
+// A new effect: one file in src/model/terms/ with its equation, and one line in term.cpp. A term with a
+// TermSearch also becomes a candidate in the search for what a model lacks.
 #pragma once
 
 #include <limits>
@@ -23,7 +23,8 @@ struct Motion {
   double motor_velocity;  // rad/s
   double load_position;   // rad
   double load_velocity;   // rad/s
-  // N m, through the teeth, > 0 drives the load forward; of one inertia what its load takes (GearTrain)
+  // N m, through the teeth, > 0 drives the load forward; of a rigid train the torque that the load takes
+  // (GearTrain)
   double mesh_torque = 0;
 };
 
@@ -39,7 +40,7 @@ struct EndTorques {
 struct FrictionLimits {
   double forward = 0;
   double backward = 0;
-  // rad, over which friction builds up after a reversal (Presliding), the same at all times; 0: at once
+  // rad, constant, over which friction builds up after a reversal (Presliding); 0: at once
   double presliding = 0;
   double presliding_damping =
       0;  // N m s/rad, damping of the presliding friction, sigma_1 of LuGre (see Presliding)
@@ -49,7 +50,7 @@ struct EndFriction {
   FrictionLimits motor, load;
 };
 
-/// Displacement of a flank from its position in the rig file, as an angle at the load.
+/// Displacement of a flank from where the rig file puts it, as an angle at the load.
 struct FlankShift {
   double opening = 0;      // rad, > 0: farther away
   double motor_slope = 0;  // d opening / d motor position
@@ -75,7 +76,7 @@ struct FlankLoad {
 /// Errors of sensors and drive.
 struct Sensing {
   double load_position_gain = 1;  // -, shown over true
-  double torque_delay = 0;        // s, the torque acts that much later than its stamp says
+  double torque_delay = 0;        // s, by which the torque acts later than its stamp
 };
 
 class Term {
@@ -85,39 +86,38 @@ class Term {
   std::string id;          // in the rig file; set by make_term()
   ParameterValues values;  // that it was made of; set by make_term()
 
-  /// Adds torques that change smoothly with the motion.
+  /// Adds torques that are a smooth function of the motion.
   virtual void add(const Motion&, EndTorques&) const {}
 
   /// Adds dry friction. Whether a body sticks or slides is found by the simulation.
   virtual bool has_dry_friction() const { return false; }
   virtual void add_friction(const Motion&, EndFriction&) const {}
 
-  /// Moves the flanks; such a term adds no torque. The mesh torque acts on both ends through the slopes, so
-  /// that the motion of the flanks is conservative.
+  /// Shifts the flanks; such a term adds no torque. The mesh torque acts on both ends through the slopes of
+  /// the shift, which conserves energy.
   virtual bool shapes_flanks() const { return false; }
   virtual bool shape_follows_torque() const { return false; }
   virtual void shape(const FlankPoint&, FlankShift&) const {}
-  /// The least opening [rad] that it gives a flank anywhere, with this half gap; -infinity if that is not
+  /// The smallest opening [rad] of a flank at any position, with this half gap; -infinity if that is not
   /// known.
   virtual double least_opening(double /*half_gap*/) const { return -std::numeric_limits<double>::infinity(); }
 
-  /// Adds to the torque with which a closed flank resists [N m], and to nothing else. A flank never pulls:
-  /// the sum is limited to >= 0.
+  /// Adds to the contact torque of a closed flank [N m], and to nothing else. A flank never pulls: the sum is
+  /// limited to >= 0.
   virtual bool loads_flanks() const { return false; }
   virtual void load_flank(const FlankLoad&, double& /*torque*/) const {}
 
-  /// Whether it reads Motion::mesh_torque. The torque of the motor is none of a term's business: the model
-  /// predicts it.
+  /// Whether it reads Motion::mesh_torque. A term must not read the motor's torque, which the model predicts.
   virtual bool follows_mesh_torque() const { return false; }
 
   virtual void sense(Sensing&) const {}
 
-  /// False for a term that acts on the motor or on a sensor only: the load then moves as without the term,
-  /// and need not be simulated again.
+  /// False for a term that acts on the motor or on a sensor only. With a recorded motor the load then moves
+  /// as without the term, and need not be simulated again.
   virtual bool moves_load() const { return true; }
 };
 
-/// The size of the motion in the records, from which a term derives the values to try. Load side.
+/// The range of the motion in the records, from which a term derives the values to try. At the load side.
 struct MotionRange {
   double torque = 0;        // N m, standard deviation of the motor's
   double speed = 0;         // rad/s, standard deviation of the motor's
@@ -127,65 +127,65 @@ struct MotionRange {
   double interval = 0;      // s, between samples
 };
 
-/// One moment of a motion, for an effect carrier * sin(order * position + ...).
+/// One sample of a motion, for an effect carrier * sin(order * position + phase).
 struct WaveMoment {
-  double position;  // rad, whose turns the order counts
+  double position;  // rad, of which the order is the number of waves per radian
   double speed;     // rad/s, of that position
   double carrier;   // +1 or -1; 0 where the effect does not show
 };
 
-/// Where a residual shows an effect with an order: as a wave over a position.
+/// In which residual an effect with an order appears, as a wave over which position.
 struct WaveOver {
-  bool deflection;  // in the residual of the deflection, else of the torque
+  bool deflection;  // true: in the residual of the deflection; false: of the torque
   WaveMoment (*at)(const Motion&, const ParameterValues& choices);
 };
 
-/// A parameter of a term that gives the effect its shape, and the values that are tried.
+/// A parameter in which a term is not linear, and the values that are tried for it.
 struct TermShape {
   std::string name;
   std::vector<double> (*values)(const MotionRange&);
-  bool refined;  // the best is then fitted with all others; else it is one of the values
-  // An order, which any number > 0 may be: those that a spectrum of the residual shows are tried as well.
+  bool refined;  // the best value is then fitted with all other parameters; else it stays one of the values
+  // Of an order, which may be any number > 0: orders that a spectrum of the residual shows are tried too.
   std::optional<WaveOver> wave = std::nullopt;
-  // 0, and not fitted, until the effect is found; then these values, which are > 0, are tried as starts.
+  // It stays 0 until the effect is found; then it is fitted too, from these values (> 0) as starts.
   bool later = false;
 };
 
 /// 1/rad: orders that differ by less are hard to distinguish over the travel; infinite where nothing moves.
 double order_resolution(const MotionRange&);
 
-/// How the search for what a model lacks tries a term: for each combination of its choices and shapes, with a
-/// strength to be fitted.
+/// How the search for what a model lacks tries a term: the strength is fitted for each combination of choices
+/// and shapes.
 struct TermSearch {
-  std::string strength;  // the parameter that is 0 where there is no such effect
+  std::string strength;  // the parameter that is 0 if the effect is absent
   std::string phase;     // of an effect strength * sin(... + phase), tried in sine and cosine; empty: none
-  double (*typical)(const MotionRange&) = nullptr;  // a strength that would show clearly, > 0
+  double (*typical)(const MotionRange&) = nullptr;  // a strength, > 0, that such records would clearly show
   std::vector<TermShape> shapes;
-  bool pairs = false;               // also two of it with different values of its one shape
+  bool pairs = false;               // also two such terms at once, with different values of their one shape
   bool needs_turning_link = false;  // has no effect on a locked link
 };
 
-/// One kind of look-up table that is learned from records: what its values are added to, and over what.
+/// One kind of look-up table that is learned from records: the quantity that its values are added to, and the
+/// coordinate.
 struct MapKind {
   std::string acts_on, coordinate;  // choices of TermMap::acts_on and TermMap::coordinate
   std::string coordinate_unit, unit;
-  bool needs_load;                        // only of a load that moves freely
-  double (*typical)(const MotionRange&);  // a value that would show clearly, > 0
+  bool needs_load;                        // only for a load that moves freely
+  double (*typical)(const MotionRange&);  // a value, > 0, that such records would clearly show
   double least;                           // value that a fit may start with; -infinity: any
 };
 
-/// A term whose law is no formula but a look-up table from the data: it says that there is an effect, not
-/// which.
+/// A term whose law is a look-up table learned from data: it shows that there is an effect, but not which.
 struct TermMap {
   std::string acts_on, coordinate, points, values;  // its parameters
   std::vector<MapKind> kinds;                       // that are learned
 };
 
-/// What of a record's calibration a term describes as well: where such a term is in the model, its strength
-/// takes over what the calibration has found, and the calibration rests.
+/// A calibration of the record that a term describes too. If such a term is in the model, its strength starts
+/// from the calibrated value, and that calibration is no longer fitted.
 enum class Calibrates { nothing, torque_delay };
 
-/// How a term says that the backlash depends on the position of the load.
+/// In which form a term makes the backlash depend on the position of the load.
 enum class GapVariation { none, harmonic, table };
 
 /// What the registry knows of a term: its id in the rig file, its parameters, how it is made.
@@ -197,19 +197,20 @@ struct TermType {
   std::optional<TermMap> map = std::nullopt;
   Calibrates calibrates = Calibrates::nothing;
   GapVariation gap_variation = GapVariation::none;
-  // How friction builds up after a reversal. Every machine's does: it is called missing only where it shows.
+  // The term describes how friction builds up after a reversal. Every machine has that, so it is reported as
+  // missing only if the record shows it.
   bool shapes_friction = false;
-  // What every machine has some of: up to these shares of the motor's dry friction and of the backlash angle
-  // its strength is in the model and not called missing.
+  // Of effects that every machine has to some extent: a strength up to these fractions of the motor's dry
+  // friction and of the backlash angle is put into the model, but not reported as missing.
   double usual_of_friction = 0, usual_of_gap = 0;
-  // Beside the declared contact law it does what another law would do alone.
+  // Together with the declared contact law it can do what another contact law would do alone.
   bool stands_in_for_contact_law = false;
 };
 
 /// By id; throws InvalidParameter for one that is not in the registry.
 const TermType& term_type(const std::string& id);
 
-/// The first one that `can`; throws InvalidParameter where none can.
+/// The first type for which `can` is true; throws InvalidParameter if there is none.
 const TermType& term_type_that(bool (*can)(const TermType&));
 
 /// All terms. There is no second list of effects anywhere.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Pairs of teeth that come and go, each with its stiffness, damping and gear error: Yumrukcal (2013),
-// Eqs. 2.1 to 2.4, there for two pairs that always touch.
+// Pairs of teeth that come into and leave contact, each with its own stiffness, damping and gear error:
+// Yumrukcal (2013), Eqs. 2.1 to 2.4, which are for two pairs that always touch.
 //
 // On each flank, with the depth d [m] by which teeth without error would overlap, pair i and the travel u_i
 // of the pair since its first touch [base pitches] (mesh_stiffness.h):
@@ -16,20 +16,21 @@
 //   e_i(u) = slope (t - 1/2) + crown (2 t - 1)^2 + side (p_pinion + p_gear),    t = u / contact ratio
 //
 // with the form of the flanks (both alike; slope: last touch minus first; crown: both ends against the
-// middle), and by how much the two teeth stand back from where they should be, constant over the pair's life:
+// middle), and with the distance p by which each of the two teeth stands back from its nominal place,
+// constant while the pair touches:
 //
 //   p = runout sin(2 pi tooth / teeth + phase) + error of that tooth          side: +1 forward, -1 reverse
 //
 // A tooth that stands back on one flank stands out on the other. Tooth 0 of the pinion meets tooth 0 of the
 // gear on the forward flank at phase 0 to contact ratio, its other flank meets tooth 1 of the gear.
 //
-// The pinion turns the pairs, so it also feels how the depth and the stiffness of a pair change with its
-// travel s = r q_P [m]: elastic energy is conserved,
+// The errors and stiffnesses change with the pinion's travel s = r q_P [m]. So that elastic energy is
+// conserved, the pinion also feels these changes:
 //
 //   torque on the gear    r side F
 //   torque on the pinion  -r (side F - sum (F_i de_i/ds - dw_i/ds E(d_i)))     E [J]: elastic energy of f
 //
-// which StiffnessVariation leaves out. Not included: contact off the line of action (the `transition` of the
+// StiffnessVariation leaves that out. Not included: contact off the line of action (the `transition` of the
 // stiffness stands for it), friction between the teeth, bending of the gears' bodies.
 #pragma once
 
@@ -42,7 +43,7 @@
 
 namespace backlash::model {
 
-/// How far the teeth of one gear stand back [m along the line of action].
+/// Distance by which the teeth of one gear stand back from their nominal place [m along the line of action].
 struct PitchErrors {
   double runout = 0, phase = 0;     // m, rad
   std::map<long, double> of_tooth;  // m, beside the runout; 0 of a tooth that is not named
@@ -67,17 +68,17 @@ class ToothPairs {
   };
   struct Push {
     double force = 0;   // N, >= 0, through the teeth
-    double spared = 0;  // N, what the pinion is spared of it: the sum in the header
+    double spared = 0;  // N, part of it that the pinion does not feel: the sum in the equation above
   };
   Push push(const Place& place, const ContactLaw& law) const;
   double elastic_energy(const Place& place, const ContactLaw& law) const;  // J
 
-  /// m: by how much a flank may touch before d = 0, >= 0.
+  /// m: largest distance by which a flank may touch before d = 0, >= 0.
   double most_protrusion() const { return protrusion_; }
   const MeshStiffness& stiffness() const { return cycle_.stiffness; }
 
  private:
-  /// A pair that may touch.
+  /// A pair within its path of contact.
   struct Pair {
     double weight, weight_slope;  // -, 1/m along the pinion's travel
     double error, error_slope;    // m, -

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The term that a weight off a joint's axis is: how what identifies one finds it.
+// The term that describes a weight off a joint's axis, for those who look for it among the terms of a rig.
 #pragma once
 
 #include <string>

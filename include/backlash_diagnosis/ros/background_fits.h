@@ -14,8 +14,8 @@ namespace backlash::ros_bridge {
 
 class BackgroundFits {
  public:
-  /// Fits the newest samples of a joint; false where there are none that it has not fitted. Loops in it end
-  /// with Cancelled soon after it is removed (base/interruption.h).
+  /// Fits the newest samples of a joint; false if there are none that it has not fitted yet. Its loops end
+  /// with Cancelled soon after remove() (base/interruption.h).
   using Fit = std::function<bool()>;
 
   BackgroundFits();
@@ -23,7 +23,8 @@ class BackgroundFits {
   BackgroundFits(const BackgroundFits&) = delete;
   BackgroundFits& operator=(const BackgroundFits&) = delete;
 
-  /// From now on `fit` has its turn among all. What it throws is logged, and what comes again once.
+  /// From now on `fit` is called in turn with the others. What it throws is logged; the same text in
+  /// succession only once.
   void add(const void* owner, Fit fit);
   void remove(const void* owner);  ///< cancels its present fit, and waits for its end
   void stop();                     ///< the same of all, for good
@@ -40,7 +41,7 @@ class BackgroundFits {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::list<Turn> turns_;          // the next one first
-  std::string problem_;            // that was logged last; of the thread
+  std::string problem_;            // that was logged last; used by the thread alone
   const void* present_ = nullptr;  // whose fit runs
   bool cancel_ = false, stop_ = false;
   std::thread thread_;

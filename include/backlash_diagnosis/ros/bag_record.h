@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Records in bags and in recordings of ROS 2 (recording/recording.h): sensor_msgs/JointState messages, no
-// roscore needed. What is said of bags holds for both.
+// roscore needed. Below, "bag" stands for both.
 //
 // Only header stamps count, never the time at which a message was received. A bag written here says by a
 // latched std_msgs/String message on the topic `record_info` which stamp is time 0 of its record, as YAML:
@@ -24,11 +24,11 @@ extern const ros::Time kBagTimeOrigin;  ///< 1e9 s: stamp of time 0 in written b
 /// Reads the record of one joint.
 ///
 /// `joint`: prefix of its names (see joint_state.h); empty: the only one that the bag has.
-/// `topic`: a topic that is this one, or whose last part is it ("/robot/joint_states"), is read.
+/// `topic`: the topic of this name, or one whose last part it is ("/robot/joint_states"), is read.
 ///
-/// Messages are taken in the order of the bag. A repeated stamp loses the later message; that, gaps and
-/// jitter are reported in Record::warnings. A channel that is NaN in all messages is absent. Record::name is
-/// the path as given.
+/// Messages are taken in the order of the bag. Of messages with the same stamp the first is kept; repeated
+/// stamps, gaps and jitter are reported in Record::warnings. A channel that is NaN in all messages is absent.
+/// Record::name is the path as given.
 ///
 /// Throws MissingInput when the file cannot be opened. Throws BadData, naming the path and where it applies
 /// topic, message (from 0) and stamp, when it is no bag, is damaged or not indexed; has no such topic or
@@ -37,13 +37,13 @@ extern const ros::Time kBagTimeOrigin;  ///< 1e9 s: stamp of time 0 in written b
 record::Record read_bag(const std::string& path, const std::string& joint = "",
                         const std::string& topic = "joint_states");
 
-/// The same by a channel map; where a rig file has none, the joint with the names of this package. Topics
-/// after the first are read at its stamps, see sample_joiner.h. Throws BadData too where the bag has not what
-/// the map says, naming what it has.
+/// The same by a channel map, which without a rig file's `channels` has the names of this package. Values of
+/// the other topics are taken at the stamps of the first, see sample_joiner.h. Throws BadData also if the bag
+/// lacks what the map names; the message says what the bag has.
 record::Record read_bag(const std::string& path, const record::ChannelMap& channels);
 
-/// One joint of a robot: by the names of this package where the bag has JOINT_motor, as one of a simulated
-/// arm does beside the robot's own names; else by the map, which is of the robot's names.
+/// One joint of a robot. If the bag has JOINT_motor, as that of a simulated arm beside the robot's own names,
+/// it is read by the names of this package, else by the map `stock` of the robot's names.
 record::Record read_robot_bag(const std::string& path, const record::ChannelMap& stock);
 
 /// Writes a record as messages of `joint` on /joint_states, stamped `origin` + time (rounded to 1 ns), whole

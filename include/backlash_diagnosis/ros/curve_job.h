@@ -6,8 +6,8 @@
 
 namespace backlash::ros_bridge {
 
-/// As build_curve() and the same curve; `memory` [GB] as that of a Job. Throws InvalidParameter, JobFailed,
-/// Cancelled.
+/// The same curve as that of build_curve(). `memory` [GB]: limit of the process. Throws InvalidParameter,
+/// JobFailed, Cancelled.
 diagnosis::MonitoringCurve build_curve_as_job(const rig_file::RigFile& rig,
                                               const studies::CurveRequest& request, double memory,
                                               const Progress& progress);

@@ -74,7 +74,8 @@ class DiagnoserNode {
                    backlash_diagnosis::Diagnose::Response& response);
   bool on_set_baseline(backlash_diagnosis::SetBaseline::Request& request,
                        backlash_diagnosis::SetBaseline::Response& response);
-  /// Takes the diagnosis of all that is kept as baseline, or forgets it; and the same in its file.
+  /// Takes the diagnosis of all samples that are kept as baseline, and writes it to the baseline's file; the
+  /// second deletes both.
   void set_baseline(Joint& joint, backlash_diagnosis::SetBaseline::Response& response);
   void clear_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response);
   bool on_get_curve(backlash_diagnosis::GetCurve::Request& request,

@@ -32,9 +32,8 @@ struct DiagnosisTask {
   diagnosis::Diagnosis compute() const;
 };
 
-/// Works through tasks in their order. Some may wait, so that a moment without processor time loses none;
-/// where it cannot keep up, a new task replaces all that wait, which is counted: what is reported is never
-/// old.
+/// Works through tasks in their order. Some may wait, so that a moment without processor time loses none. If
+/// too many wait, a new task replaces all of them, which is counted; so what is reported is never old.
 class DiagnosisWorker {
  public:
   using Work = std::function<void(const DiagnosisTask&)>;
@@ -47,7 +46,7 @@ class DiagnosisWorker {
 
   void add(DiagnosisTask task);  ///< does not wait for work
   long replaced() const;         ///< tasks that were never worked on
-  /// Whether it has nothing to do, and has had for so many times as long as the latest task took.
+  /// Whether it has been idle for `times` times the duration of the latest task.
   bool rested(double times) const;
   void stop();  ///< waits for the present task and the latest that waits; then nothing is taken
 

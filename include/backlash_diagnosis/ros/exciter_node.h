@@ -3,7 +3,7 @@
 // bag.
 //
 // Threads: one for states, one of the action that commands, and the main thread, which looks after the
-// master, other publishers and signals. Whatever ends a run, the last commands are zero.
+// master, other publishers and signals. However a run ends, its last commands are zero.
 #pragma once
 
 #include <actionlib/server/simple_action_server.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What can be asked of one simulated joint while it runs, by itself or in an arm: its topics true_backlash
-// and torque_command, the service set_backlash, the live parameters.
+// The interface of one simulated joint while it runs, alone or in an arm: topics true_backlash and
+// torque_command, service set_backlash, live parameters.
 #pragma once
 
 #include <ros/node_handle.h>
@@ -47,7 +47,7 @@ class JointControls {
 
   /// Before each sample: a torque_command that is too old is zero.
   void age_torque();
-  /// Publishes what is in force where it was changed in another way than here.
+  /// Publishes the values in force after something else has changed them.
   void publish();
   std::string true_backlash() const;  // with its unit, for people
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What /diagnostics says of a joint, one status per concern (REP 107): backlash, input, excitation, signal
-// quality, curve domain.
+// The statuses of a joint on /diagnostics (REP 107): backlash, input, excitation, signal quality, curve
+// domain.
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>
@@ -31,7 +31,8 @@ class JointDiagnostics {
   void add_to(diagnostic_updater::DiagnosticTaskVector& tasks);
   void set(const DiagnosticsSettings& settings);
 
-  /// Looks at the joint; true where a level differs from that at the last call: to be published at once.
+  /// Reads the state of the joint; true if a level has changed since the last call, so that it should be
+  /// published at once.
   bool update();
 
   /// What the status `input` says now.

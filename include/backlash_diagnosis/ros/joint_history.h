@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The history of a joint as the diagnoser keeps it: entries go to a file from a thread that may wait for the
-// disk, those that could not be written yet are kept and tried again; and the trend of all of them.
+// The history of a joint that the diagnoser keeps, and its trend. A thread that may wait for the disk writes
+// entries to a file; entries that could not be written are kept and tried again.
 #pragma once
 
 #include <deque>
@@ -37,13 +37,14 @@ class JointHistory {
   /// Opens the file and reads what it holds. Throws CannotWrite, BadData.
   explicit JointHistory(const Settings& settings);
 
-  /// Takes the verdict at a stamp [s since 1970] where one is due; does not wait for the disk.
+  /// Adds the verdict at a stamp [s since 1970] if the interval since the last entry is over; does not wait
+  /// for the disk.
   void take(double stamp, const diagnosis::Diagnosis& diagnosis);
   /// Marks where the healthy machine was taken: the trend begins anew.
   void take_baseline(double stamp, const diagnosis::Diagnosis& diagnosis);
 
-  /// Writes what waits, and finds the trend towards `limit` (service, in the unit of the trend) where there
-  /// is something new. From one thread only.
+  /// Writes the entries that wait, and after new ones computes the trend towards `limit` (service, in the
+  /// unit of the trend). Always from the same thread.
   void flush(std::optional<double> limit);
 
   State state() const;

@@ -22,8 +22,8 @@ class JointInputs {
   /// As the maps name them, each once.
   const std::vector<std::string>& topics() const { return topics_; }
 
-  /// `problem`: as of JointStateReader, or that a declared name is not on its topic (and which ones are),
-  /// where values are of no use.
+  /// `problem`: as that of JointStateReader, or that a declared name is not on its topic, with the names that
+  /// are. Empty if `values` can be used.
   using OnSample = std::function<void(std::size_t joint, const ros::Time& stamp,
                                       const record::ChannelValues& values, const std::string& problem)>;
 

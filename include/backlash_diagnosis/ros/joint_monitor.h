@@ -74,8 +74,8 @@ class JointMonitor {
   /// `stamp` is that of their last sample.
   using OnDiagnosis = std::function<void(const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis)>;
 
-  /// `fits` outlives the monitor; null: the methods that take seconds (`waveform`, `gap_traverse`) are in no
-  /// running estimate, and `waveform` in no answer.
+  /// `fits` must outlive the monitor. Without it (null) the methods that take seconds (`waveform`,
+  /// `gap_traverse`) are left out of running estimates, and `waveform` also of answers.
   explicit JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis = nullptr,
                         BackgroundFits* fits = nullptr);
   ~JointMonitor();
@@ -84,14 +84,16 @@ class JointMonitor {
   const rig_file::RigFile& rig() const { return settings_.rig; }
   const std::string& baseline_path() const { return settings_.baseline_path; }
 
-  /// Takes what a message says of the joint, or what is wrong with it (see JointStateReader); a report when
-  /// it completes a period with an APD. Bad content is counted and reported by state(). A running estimate is
-  /// due with such a period; without an APD as soon as the estimate before it has taken no more than a tenth
-  /// of the time since. Where one is due it copies the window; the rest of the work is not done here.
+  /// Takes the values of the joint in a message, or what is wrong with them (see JointStateReader). Returns a
+  /// report if they complete a period with an APD. Bad content is counted and reported by state(). A running
+  /// estimate is due with each such period; without an APD it is due when at least ten times the duration of
+  /// the last estimate has passed. Then the window is copied here; the estimate is computed in the monitor's
+  /// thread.
   std::optional<PeriodReport> take(const ros::Time& stamp, const record::ChannelValues& values,
                                    const std::string& problem, const std::string& topic);
 
-  /// What the samples of the last `seconds` show to be wrong with them, as the commands see it.
+  /// The check of a recording (record_check.h), as the commands make it, on the samples of the last
+  /// `seconds`.
   record::RecordCheck check_recording(double seconds) const;
 
   /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s]
@@ -100,7 +102,8 @@ class JointMonitor {
   /// all.
   diagnosis::Diagnosis diagnose(long periods, double timeout, std::string& note, ros::Time& stamp);
 
-  /// Whether all that is kept is of one play: empty, or since when it is another one, in words.
+  /// Whether the play is the same in all samples that are kept: empty if so, else since when it differs, in
+  /// words.
   std::string change_of_play() const;
 
   /// Ends the running estimates: the latest that waits is still reported.

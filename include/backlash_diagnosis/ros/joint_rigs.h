@@ -28,10 +28,11 @@ std::vector<JointRig> load_joint_rigs(Parameters& parameters);
 std::optional<record::ChannelMap> read_channels(Parameters& parameters, const std::string& name,
                                                 const std::string& joint);
 
-/// As a robot publishes a joint of its URDF: position, velocity where it does, and as effort that channel.
+/// The channel map of a joint under its name in the URDF: position, velocity if it is published, and `effort`
+/// for the channel that the effort carries.
 record::ChannelMap robot_channels(const std::string& joint, record::Channel effort);
 
-/// Path of a file of a joint in a folder: a joint's name may have parts, a file's name may not.
+/// Path of a joint's file in a folder: slashes in the joint's name are replaced.
 std::string joint_path(const std::string& folder, std::string joint, const std::string& ending);
 
 }  // namespace backlash::ros_bridge

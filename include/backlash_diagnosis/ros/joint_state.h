@@ -38,18 +38,18 @@ class StampClock {
   ros::Time origin_;
 };
 
-/// Reads the messages of one topic, each name looked up once; allocates only for what is wrong.
+/// Reads the messages of one topic. Each name is looked up once; memory is allocated only for errors.
 class JointStateReader {
  public:
   /// `joints`: of each joint its sources on this topic.
   explicit JointStateReader(const std::vector<record::ChannelMap>& joints);
 
-  /// The joints that a message speaks of, by their place in `joints` (the topic may carry others). This and
-  /// what follows are valid until the next call.
+  /// The joints of which a message has values, by their place in `joints` (the topic may carry others). The
+  /// results here and below are valid until the next call.
   const std::vector<std::size_t>& read(const sensor_msgs::JointState& message);
   const record::ChannelValues& values(std::size_t joint) const { return readings_[joint].values; }
   /// What is wrong with a joint: position, velocity or effort neither empty nor as long as `name` (array and
-  /// sizes), a name twice, an infinite value. Empty where nothing is.
+  /// sizes), a name twice, an infinite value. Empty if nothing is.
   const std::string& problem(std::size_t joint) const { return readings_[joint].problem; }
 
  private:
@@ -87,7 +87,8 @@ void add_joint_state(const record::Record& record, std::size_t i, const JointNam
                      sensor_msgs::JointState& message);
 
 /// Adds a simulated sample as a robot publishes a joint, under the name of its URDF: position and velocity of
-/// the link, effort = motor torque. Only for those who look at a robot; the names above say which end it is.
+/// the link, effort = motor torque. For programs that show a robot; the names above say on which end of the
+/// gear a value is.
 void add_robot_joint(const model::Observation& observation, const std::string& joint,
                      sensor_msgs::JointState& message);
 

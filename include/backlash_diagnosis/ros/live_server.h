@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // dynamic_reconfigure with refusal: a wrong value changes nothing and the reason is in the answer.
 //
-// Served below the name "live", so that what was set while a node ran is never taken for its configuration at
-// the next start: the parameters there are overwritten with what is in force.
+// The parameters are below the name "live" and are overwritten with the values in force at each start. So
+// what was set while a node ran never becomes its configuration at the next start.
 #pragma once
 
 #include <dynamic_reconfigure/server.h>
@@ -24,7 +24,7 @@ constexpr const char* kLive = "live";
 template <typename Config>
 class LiveServer {
  public:
-  /// Throws Error where a value may not be set; nothing may have changed then.
+  /// Throws Error if a value may not be set; then nothing may have changed.
   using Apply = std::function<void(const Config&)>;
 
   LiveServer(const ros::NodeHandle& parent, const Config& in_force, Apply apply)
@@ -35,7 +35,7 @@ class LiveServer {
     server_.setCallback([this](Config& wanted, std::uint32_t) { take(wanted); });
   }
 
-  /// Publishes values that were changed in another way than by dynamic_reconfigure.
+  /// Publishes values that something else than dynamic_reconfigure has changed.
   void update(const Config& in_force) {
     const boost::recursive_mutex::scoped_lock lock(mutex_);
     in_force_ = in_force;

@@ -17,8 +17,8 @@ struct Registrations {
   bool empty() const { return publications.empty() && subscriptions.empty() && services.empty(); }
 };
 
-/// Asks the master every `interval` [s of wall time] what it knows of this node. Where it knows nothing any
-/// more, registers again what it knew last, and says so on the log; so also where the master does not answer.
+/// Asks the master every `interval` [s of wall time] what it knows of this node. If it knows nothing any
+/// more, registers again what it knew last. Logs this, and also when the master does not answer.
 class MasterWatch {
  public:
   explicit MasterWatch(double interval = 1);

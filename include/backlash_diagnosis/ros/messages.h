@@ -24,7 +24,7 @@ backlash_diagnosis::AmplitudeDistribution to_message(const diagnosis::ApdResult&
 /// `stamp` is that of the last sample of the diagnosis; an estimate of earlier samples has theirs.
 backlash_diagnosis::BacklashEstimate to_message(const diagnosis::Estimate& estimate,
                                                 const ros::Time& stamp = {});
-/// The estimates that the verdict is about give its members their names.
+/// `estimates`: those that the verdict combines, for the names of its members.
 backlash_diagnosis::Verdict to_message(const diagnosis::Verdict& verdict,
                                        const std::vector<diagnosis::Estimate>& estimates);
 backlash_diagnosis::MonitoringCurve to_message(const diagnosis::MonitoringCurve& curve);

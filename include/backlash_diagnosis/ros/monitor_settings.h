@@ -9,8 +9,8 @@
 
 namespace backlash::ros_bridge {
 
-/// Reads ~rig or ~rig_folder, ~joints, and what is said of each joint; `defaults` has what all share. Throws
-/// InvalidParameter, BadData, MissingInput.
+/// Reads ~rig or ~rig_folder, ~joints, and the parameters of each joint; `defaults` has the settings that all
+/// joints share. Throws InvalidParameter, BadData, MissingInput.
 std::vector<MonitorSettings> load_monitors(Parameters& parameters, const MonitorSettings& defaults);
 
 }  // namespace backlash::ros_bridge

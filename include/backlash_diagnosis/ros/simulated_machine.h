@@ -22,9 +22,9 @@ class SimulatedMachine {
 
   /// Where its samples go.
   virtual std::vector<std::string> topics() const = 0;
-  /// The next sample, added to the message of each of its topics. Throws IntegrationError.
+  /// Computes the next sample and adds it to the message of each of its topics. Throws IntegrationError.
   virtual void step(std::map<std::string, sensor_msgs::JointState>& messages) = 0;
-  /// At rest, backlash as at the start.
+  /// Back to rest, with the backlash of the start.
   virtual void reset() = 0;
 
   /// For people: what is simulated, by which file.

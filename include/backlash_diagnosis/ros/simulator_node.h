@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The simulator as a ROS node: simulated joints or an arm, paced by a clock.
 //
-// One thread: bursts of samples that are due, then the callbacks, then the next burst. So a service or a
-// torque acts at a sample boundary: from the time of the last published sample on.
+// One thread: it publishes the samples that are due, then calls the callbacks, and so on. So a service or a
+// torque acts from the time of the last published sample on.
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>

@@ -9,13 +9,13 @@
 namespace backlash::signal {
 
 struct ValueText {
-  std::string value;  // as many digits as the error leaves
-  std::string error;  // two digits; empty: not known, or 0
+  std::string value;  // rounded to the place of the error's last digit
+  std::string error;  // two digits; empty if it is unknown or 0
 };
 
 ValueText value_text(const Measured& m);
 
-/// "1.234 +- 0.056"; the value alone where the error is not known, or 0.
+/// "1.234 +- 0.056"; the value alone if the error is unknown or 0.
 std::string with_error(const Measured& m);
 
 }  // namespace backlash::signal

@@ -3,11 +3,12 @@
 //
 // For each order n [1/rad] the share of the sum of squares of y that the best
 //   y = c (A sin(n q) + B cos(n q))      q: position [rad], c: carrier
-// takes away: Lomb (1976, Astrophys. Space Sci. 39:447) with a carrier, with columns that are fitted as well
-// (Zechmeister and Kuerster 2009, Astron. Astrophys. 496:577 do that with a constant) and with samples that
-// count only up to an order of their own, since a machine that moves fast passes high orders beyond the band.
-// Low orders are solved exactly. Above, where waves are orthogonal to their neighbours and to smooth columns,
-// the sums come from a Fourier transform over a grid of positions.
+// explains. This is the periodogram of Lomb (1976, Astrophys. Space Sci. 39:447) with three additions: the
+// carrier; columns that are fitted at the same time (Zechmeister and Kuerster 2009, Astron. Astrophys.
+// 496:577, do so with a constant); and a highest order of each sample, because at high speed a high order
+// lies beyond the band of the signal. Low orders are solved exactly. At higher orders, where waves are
+// orthogonal to their neighbours and to smooth columns, the sums come from a Fourier transform over a grid of
+// positions.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,12 +29,12 @@ struct OrderSpectrum {
   double resolution = 0;  // 1/rad: 2 pi over the travel of the samples that count
   double first = 0, step = 0;
   std::vector<double> share;  // 0 to 1, of the sum of squares of the values that count at that order
-  std::vector<double> taken;  // the same in squares of the value: what line is strongest
+  std::vector<double> taken;  // the same as a sum of squares, by which lines are ranked
 };
 
-/// Orders from one period in the travel to `largest`, or as far as a tenth of the samples count, eight lines
-/// per resolution. Empty where there are too few samples (16), or they do not move. `known`: orthonormal
-/// columns over the samples that are fitted as well (no columns: none); `value` is orthogonal to them.
+/// Orders from one period in the whole travel to `largest` [1/rad], at most to where a tenth of the samples
+/// count, with eight lines per resolution. Empty for fewer than 16 samples, or if the position does not move.
+/// `known`: orthonormal columns that are fitted at the same time, to which `value` must be orthogonal.
 OrderSpectrum order_spectrum(const OrderSamples& samples, double largest, const Eigen::MatrixXd& known = {});
 
 struct OrderPeak {
@@ -41,8 +42,8 @@ struct OrderPeak {
   double share = 0, taken = 0;
 };
 
-/// The strongest lines, at least a resolution apart, strongest first; between lines by a parabola. Those
-/// below `lowest` are left out.
+/// The `count` strongest lines at or above `lowest` [1/rad], at least one resolution apart, strongest first.
+/// The order of a peak between two lines is that of a parabola through three lines.
 std::vector<OrderPeak> strongest_orders(const OrderSpectrum& spectrum, std::size_t count, double lowest = 0);
 
 }  // namespace backlash::signal

@@ -18,8 +18,8 @@ double median(std::vector<double> values);
 /// median(|value|)
 double median_magnitude(std::vector<double> values);
 
-/// quantile(values, 1 - tail) - quantile(values, tail): how far a signal travels, but for the rarest `tail`
-/// [0, 0.5) on either side.
+/// quantile(values, 1 - tail) - quantile(values, tail): the range of a signal without the fraction `tail` [0,
+/// 0.5) at either end. NaN without values.
 double quantile_range(std::vector<double> values, double tail);
 
 /// Smallest and largest value; both 0 without values.

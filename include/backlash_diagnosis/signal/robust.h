@@ -16,7 +16,7 @@ struct RobustScale {
   std::size_t outliers = 0;  ///< values farther than `clip` from the median
 };
 
-/// `floor` [unit of the values, >= 0] is the smallest difference that may count as one.
+/// `floor` [unit of the values, >= 0]: a value that differs from the median by less is never an outlier.
 RobustScale robust_scale(const std::vector<double>& values, double floor);
 
 }  // namespace backlash::signal

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Where in a step of an integration a quantity comes to 0, of which a cubic through both ends is known.
+// Where within an integration step a quantity passes 0, from a cubic through both ends of the step.
 #pragma once
 
 #define DIAGNOSIS_IN_LINE inline __attribute__((always_inline))
 
 namespace backlash::signal {
 
-/// Between 0 and 1; of what is no number 0. T: double, or a vector of them side by side.
+/// `share` limited to [0, 1]; NaN gives 0. T: double, or a vector of doubles (lanes).
 template <typename T>
 DIAGNOSIS_IN_LINE T share_within(const T& share) {
   const T not_less = share > 0 ? share : T{};
@@ -15,8 +15,8 @@ DIAGNOSIS_IN_LINE T share_within(const T& share) {
 
 /// The share u of the step at which
 ///   f(u) = begin + u first + u^2 second + u^3 third,   begin <= 0 < begin + chord = f(1)
-/// is 0: Newton's method from the chord, which such an f all but follows. Where it is flat the chord's slope
-/// is taken. Always between 0 and 1.
+/// is 0, by Newton's method from the chord's root. Where f is flat the slope of the chord is used. Always in
+/// [0, 1].
 template <typename T>
 DIAGNOSIS_IN_LINE T root_in_step(const T& begin, const T& chord, const T& first, const T& second,
                                  const T& third) {
@@ -32,14 +32,14 @@ DIAGNOSIS_IN_LINE T root_in_step(const T& begin, const T& chord, const T& first,
   return u;
 }
 
-/// Of the cubic with the slopes `first` and `last`, per step, at both ends.
+/// The same for the cubic from `begin` to `end` with the slopes `first` and `last` [per step] at its ends.
 template <typename T>
 DIAGNOSIS_IN_LINE T root_by_slopes(const T& begin, const T& end, const T& first, const T& last) {
   const T chord = end - begin;
   return root_in_step<T>(begin, chord, first, 3 * chord - 2 * first - last, first + last - 2 * chord);
 }
 
-/// Of the parabola through the middle.
+/// The same for the parabola through `begin`, `middle` (half a step) and `end`.
 template <typename T>
 DIAGNOSIS_IN_LINE T root_by_middle(const T& begin, const T& middle, const T& end) {
   const T chord = end - begin, first = 4 * middle - 3 * begin - end;

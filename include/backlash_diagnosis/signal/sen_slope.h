@@ -9,7 +9,7 @@ namespace backlash::signal {
 
 class SenSlope {
  public:
-  /// `times` rise, and are not all the same.
+  /// `times` do not decrease, and are not all the same; as many `values`.
   SenSlope(const std::vector<double>& times, const std::vector<double>& values);
 
   double value() const;
@@ -17,8 +17,9 @@ class SenSlope {
   struct Interval {
     double lower, upper;  // 95 %; both NaN where the points are too few for one
   };
-  /// All slopes that Kendall's test does not reject, normal approximation, with its variance for ties of the
-  /// times (Sen 1968); `inflation` multiplies that variance.
+  /// All slopes that Kendall's test does not reject at 5 %, with the normal approximation and the variance
+  /// for tied times (Sen 1968). `inflation` >= 1 multiplies that variance, for correlated errors
+  /// (error_memory.h).
   Interval interval(double inflation) const;
 
  private:

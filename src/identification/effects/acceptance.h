@@ -8,11 +8,11 @@
 
 namespace backlash::identification {
 
-/// Gain that is enough in a residual that is mostly noise, where a clear effect is a small part of it: as
-/// much as noise itself hardly ever gains. Of n independent values of a channel noise gains sure^2 / (2 n).
+/// Sufficient gain if the residual is mostly noise, so that even a clear effect is a small part of it: a gain
+/// that noise alone hardly ever reaches. Of n independent values of a channel noise gains sure^2 / (2 n).
 double least_gain_in_noise(const RecordSet& records, const SearchSettings& settings);
 
-/// Why `gain`, of a machine that was fitted to these records, does not convince; empty where it does.
+/// Why `gain`, of a machine fitted to these records, is not sufficient; empty if it is.
 std::string objection(const Gain& gain, const Machine& after, const RecordSet& records,
                       const SearchSettings& settings);
 

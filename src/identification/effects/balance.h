@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What two encoders show of a geared machine without a simulation of its teeth: two sums, linear in all that
-// is sought.
+// Two equations of a geared machine with two encoders that need no simulation of its teeth and are linear in
+// all unknowns.
 //   whole train     tau = J_M a_M + J_L a_L + b w_M + F s_M - terms on either end
 //   pressed flank   q_M - q_L = zero + side g / 2 + T / k + skew w_L + shift of the flank by terms
 // s_M = +-1 is the direction of the motor; T = J_L a_L + b_L w_L + F_L s_M, with the values of a fit, is what
 // the teeth transmit; side is its sign. The first is Newton's law of both bodies together: it holds whatever
-// the teeth do, across the gap as well. Where dry friction may take any value (first sum) or no flank is
-// pressed (second) no sample counts, and none that the low-pass mixes with such a one.
+// the teeth do, across the gap as well. Left out are samples at which dry friction may take any value (first
+// equation) or no flank is pressed (second), and their neighbours within the memory of the low-pass.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,20 +27,20 @@ class Balance {
   /// Of the machine with its terms. `data`: its records, which must outlive this.
   Balance(const Machine& machine, const std::vector<ServoData>& data, const Cutoffs& cutoffs);
 
-  /// Measured minus what the machine's values and the strengths of its terms can explain, each channel in
-  /// units of its standard deviation.
+  /// Measured minus the part that the machine's values and the strengths of its terms explain; each channel
+  /// in units of its standard deviation.
   const Eigen::VectorXd& left() const { return left_; }
-  /// Of what a term changes in both sums, in the same units, what the machine cannot explain as well; 0 where
-  /// that is less than `least_own` of it.
+  /// The change of both sums by a term, less the part that the machine's own values explain, in the same
+  /// units; 0 if what remains is less than `least_own` of the change.
   Eigen::VectorXd column(const model::Term& term, double least_own) const;
 
-  /// What columns explain of the channel of which they explain more: relative decreases of the norm of
+  /// How much columns explain, in the channel in which they explain more: relative decreases of the norm of
   /// left().
   struct Explained {
     bool deflection = false;
-    double gain = 0;           // with the factors that all of the records want
-    double gain_held_out = 0;  // of blocks, each with the factors that the others want
-    double gain_forward = 0;   // of the later part, with the factors that the earlier wants
+    double gain = 0;           // with factors fitted to all records
+    double gain_held_out = 0;  // of blocks, each with factors fitted to the others
+    double gain_forward = 0;   // of the later part, with factors fitted to the earlier
     int better = 0;            // blocks
     double of_signal = 0;      // held out, what is taken away over the standard deviation of the channel
   };

@@ -30,11 +30,11 @@ struct Candidate {
 std::vector<const model::TermShape*> fitted_shapes(const Candidate& candidate, std::size_t term);
 
 /// The best candidate of each kind and choice, best first. `fit` is the present fit with its sensitivities.
-/// What a change of the fitted parameters explains is not counted as a gain of a candidate.
+/// What the fitted parameters could explain by changing does not count as a gain of a candidate.
 std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
                               const model::MotionRange& range, const ScreenSettings& settings);
 
-/// What a term changes of residuals, less what the fitted parameters explain as well.
+/// The change of the residuals by a term, less the part that the fitted parameters explain.
 using ColumnOf = std::function<Eigen::VectorXd(const model::Term&)>;
 /// The same of other residuals, `left`, with their own sensitivities.
 std::vector<Candidate> screen(const model::Rig& rig, const ResidualOrders& orders,

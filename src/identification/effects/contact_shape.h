@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Another law for the teeth: a wrong one looks like hardening, and hides what else is missing.
+// Another contact law for the teeth. A wrong law looks like a hardening mesh and hides other missing effects.
 #pragma once
 
 #include <optional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How much of what a model leaves still follows the state of the machine, whatever the law: an upper bound of
-// what any further effect can explain, and so of the noise.
+// How much of a residual follows the state of the machine, by whatever law. This is an upper bound of what
+// further effects can explain; the rest is noise.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ struct Predicted {
   ServoPrediction prediction;
 };
 
-/// What one state, or all of them together, say of the residual.
+/// How much one state, or all of them together, predict of the residual.
 struct Follows {
   std::string name;
   signal::PredictedShare share;
@@ -31,20 +31,19 @@ struct Remainder {
   double signal = 0;     // the same unit: standard deviation of what was measured
   double explained = 0;  // the same unit: what the found effects of this channel took away; 0: none
   signal::PredictedShare explainable;
-  std::vector<Follows> follows;  // each state alone, the one that says most first; none: too few samples
-  /// Of 20 parts of the records, the largest sum of squares over their mean: noise that does not change is
-  /// about the same everywhere.
+  std::vector<Follows> follows;  // each state alone, the best predictor first; empty: too few samples
+  /// The largest sum of squares of 20 parts of the records over their mean: about 1 for noise that is the
+  /// same everywhere.
   double unevenness = 0;
 };
 
-/// What is left, measured minus predicted, differs by as much from one time to the next where the motion
-/// repeats; else 0.
+/// If the motion repeats, the standard deviation by which the residual differs between repetitions; else 0.
 double repeated_noise(const Predicted& record, bool deflection);
 
-/// Of all samples that count. Too few (least_samples) say how much is left, and not what it follows. States:
-/// position (and the strongest orders of it), velocity, acceleration, transmitted torque and path since the
-/// last reversal, all of them as the model has them, and time. The measured torque is none of them: it holds
-/// its own noise.
+/// From all samples that count; fewer than least_samples give the size of the residual only. States: position
+/// (and its strongest orders), velocity, acceleration, transmitted torque and path since the last reversal,
+/// all as the model predicts them, and time. The measured torque is not among them, as its noise is part of
+/// the residual.
 Remainder remainder(const std::vector<Predicted>& records, bool deflection, double cutoff,
                     const ExplainableSettings& settings);
 

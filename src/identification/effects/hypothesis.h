@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the search compares: a machine with some effects, fitted, with the evidence for each effect and the
-// reasons why others are not in it. A value: steps of the search take one and give another, cheap to copy.
+// What the search compares: a fitted machine with some effects, the evidence for each of them, and the
+// reasons why others were rejected. Steps of the search take a hypothesis and return another; copies are
+// cheap.
 #pragma once
 
 #include <functional>
@@ -50,7 +51,8 @@ struct SearchContext {
 const Misfit& misfit(const Hypothesis& h);
 /// Of the misfit, of both channels.
 double size(const Hypothesis& h);
-/// What is left of either channel is close to noise: no other set of effects needs to be tried.
+/// Whether the residuals of both channels are close to noise, so that no other set of effects needs to be
+/// tried.
 bool clearly_right(const Misfit& misfit, const SearchContext& context);
 bool has_learned_map(const std::vector<Effect>& effects);
 
@@ -58,8 +60,8 @@ Hypothesis with_rejected(Hypothesis h, const std::string& effect, const std::str
 /// All effects that were rejected and are not in it after all, each with the latest reason.
 std::vector<RejectedEffect> rejected_effects(const Hypothesis& h);
 
-/// A value that came out near 0 without an effect (dry friction at or below it) is where the model no longer
-/// feels it: with the effect its fit starts at the declared value again.
+/// Without the effect a value may have been fitted to about 0 (dry friction at or below it), where the model
+/// hardly depends on it. With the effect its fit starts at the declared value again.
 Machine with_vanished_again(Machine machine, const Machine& declared);
 
 /// The machine with the terms of a candidate, whose values are fitted as well.

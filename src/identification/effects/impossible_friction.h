@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A friction below zero, which drives: what a fit makes of it belongs to an effect that the model lacks.
+// A negative friction would drive the machine. If a fit finds one, the model lacks an effect.
 #pragma once
 
 #include <map>
@@ -20,8 +20,8 @@ struct MotionSize {
 };
 MotionSize motion_size(const ServoData& record);
 
-/// The friction that is below zero by the most of its standard errors, where they are `belief.least_z` and
-/// its torque is worth saying; none where the machine is possible.
+/// The friction that is negative by most standard errors, if by at least `belief.least_z` of them and if its
+/// torque is not negligible; none otherwise.
 std::optional<Unexplained> impossible_friction(const std::map<std::string, signal::Measured>& fitted,
                                                const std::map<std::string, std::string>& units,
                                                const MotionSize& motion, const BeliefSettings& belief,

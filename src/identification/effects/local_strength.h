@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Whether an effect is as strong where it acts most as it is over all. A term that stands in for another
-// follows it over the whole record, and not where it matters (a test for constant parameters, Chow 1960).
+// Whether an effect is as strong where it acts most as over the whole record. A term that stands in for
+// another one fits it on average, but not where it acts most (a test for constant parameters, Chow 1960).
 #pragma once
 
 #include <optional>
@@ -14,9 +14,10 @@ struct LocalStrength {
   double ratio = 1, standard_error = 0;
 };
 
-/// By a linear step from the fit; parameters of the machine and of other effects are free, shapes of terms
-/// are not. Of an effect with one term; nothing for several and for maps. `judged`: strength as
-/// fitted; what its error is larger than that of independent rows this one is as well.
+/// By one linear step from the fit, with the parameters of the machine and of other effects free and the
+/// shapes of terms fixed. Only for an effect with one term; nothing for several terms and for maps. `judged`:
+/// the strength as fitted. The factor by which its error exceeds that of independent rows is applied here
+/// too.
 std::optional<LocalStrength> local_strength(const Hypothesis& h, std::size_t effect,
                                             const signal::Measured& judged);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the machine's own parameters cannot take up of residuals and of sensitivities.
+// The part of residuals and sensitivities that the machine's own parameters cannot explain.
 #pragma once
 
 #include <Eigen/Core>

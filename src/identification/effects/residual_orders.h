@@ -10,7 +10,7 @@
 
 namespace backlash::identification {
 
-/// 1/rad: up to here a sample with this speed [rad/s] shows orders through a low-pass [Hz].
+/// 1/rad: highest order that a sample at this speed [rad/s] shows behind a low-pass [Hz].
 double highest_order(double speed, double cutoff);
 
 class ResidualOrders {
@@ -18,7 +18,7 @@ class ResidualOrders {
   /// `left` is of `fit`; all must outlive it.
   ResidualOrders(const MachineFit& fit, const RecordSet& records, const OrthogonalPart& left);
 
-  /// Of what is left where the machine's own parameters are fitted as well.
+  /// Of the residual, with the machine's own parameters fitted at the same time.
   signal::OrderSpectrum spectrum(const model::WaveOver& wave, const ParameterValues& choices) const;
 
  private:

@@ -17,8 +17,8 @@ struct Trial {
   double residual = 0;  // norm of all rows
 };
 
-/// Fits machine and candidate with the weights of the hypothesis, so that fits can be compared. Nothing where
-/// that fails or, half way, is far from the residual that is wanted.
+/// Fits machine and candidate with the weights of the hypothesis, so that fits can be compared. Nothing if
+/// the fit fails, or is far from the wanted residual after its rough half.
 std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, const SearchContext& context,
                            double wanted = std::numeric_limits<double>::infinity());
 
@@ -30,8 +30,8 @@ struct Trials {
 Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
                   const SearchContext& context);
 
-/// Orders that the travel does not resolve stay whole numbers, the best of those near to what a fit says,
-/// unless any number leaves clearly less.
+/// An order that the travel does not resolve becomes the best whole number near its fitted value, unless the
+/// fitted value leaves a clearly smaller residual.
 Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context);
 
 }  // namespace backlash::identification

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// By how much a model lessens the error on the unseen record, and how sure that is.
+// By how much a model reduces the error on the unseen record, with an interval.
 #pragma once
 
 #include <vector>
@@ -10,8 +10,8 @@
 
 namespace backlash::identification {
 
-/// What a prediction leaves of one channel where it counts: sum of squares per block of the record, and what
-/// noise leaves of their sum.
+/// The residual of one channel at the samples that count: sum of squares per block of the record, and the
+/// part of their sum that noise alone would leave.
 struct Left {
   std::vector<double> square;
   double noise = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the machine before and after each effect says of a record that the search has not seen.
+// Predictions of a record that the search has not seen, before and after each effect.
 #pragma once
 
 #include <vector>
@@ -11,8 +11,8 @@ namespace backlash::identification {
 /// Of a record that the machine was not fitted to. `settings` have their bands.
 Calibration calibrated(Machine machine, const ServoData& record, const FitSettings& settings);
 
-/// What a machine says of a record that it was not fitted to, with the record's own calibration. `settings`
-/// have their bands.
+/// The prediction of a record that the machine was not fitted to, with the record's own calibration.
+/// `settings` have their bands.
 ServoPrediction predicted(const Machine& machine, const ServoData& record, const FitSettings& settings);
 
 /// The machine before any effect, then with each effect and those before it.

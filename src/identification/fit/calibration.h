@@ -1,26 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a fit makes of the delay of the torque: held between samples or of the moment, calibration or effect.
+// The delay of the torque in a fit: whether the torque is held between samples or sampled at the moment, and
+// whether a delay is calibration or an effect.
 #pragma once
 
 #include "joint_fit.h"
 
 namespace backlash::identification {
 
-/// A torque that seems to act over a quarter of a sample earlier than a held one is that of the moment.
+/// A torque that acts more than a quarter of a sample earlier than a held one would is a torque of the
+/// moment.
 void release_hold(Machine& machine);
 /// The reverse: a torque of the moment that seems to act more than a quarter of a sample later is held. Asked
 /// once an effect has been added that the delay may have stood in for.
 void restore_hold(Machine& machine);
 
-/// Where a delay is longer than `longest` [samples] that much stays and is fitted no more, so that the rest
-/// shows as an effect.
+/// A delay longer than `longest` [samples] is limited to it and no longer fitted, so that the rest shows as
+/// an effect.
 void limit_delay(Machine& machine, double longest);
 
-/// rad: the encoders' offset at which the load is, in the median, where the motor is. Each record has its
-/// own, for an encoder that counts finds its zero anew whenever the robot is switched on.
+/// rad: the offset of the encoders with which the median of motor minus load is 0. Each record has its own,
+/// as an incremental encoder finds a new zero whenever the robot is switched on.
 double middle_offset(const ServoData& record);
 
-/// No delay by calibration, where a term of the model is the delay.
+/// Sets the delays of the calibration to 0 if a term of the model is the delay.
 void without_calibration(Machine& machine);
 
 /// Moves the mean delay of the calibrations into the last term, a delay.

@@ -22,9 +22,9 @@ struct FitParameter {
 /// By its name among servo_parameters(). Throws InvalidParameter for one that must be > 0 and is not.
 FitParameter machine_parameter(const std::string& name, const model::Rig& rig);
 
-/// What is declared of friction and stiffness, one row each in standard deviations: where a deflection is all
-/// that is predicted, friction and skew of the encoders look alike, and a stiff machine hardly shows how
-/// stiff.
+/// The declared friction and stiffness as priors, one row each in standard deviations. If only the deflection
+/// is predicted, friction and the skew of the encoders look alike, and a stiff machine hardly shows its
+/// stiffness.
 std::vector<std::function<double(const model::Rig&)>> rows_as_declared(const model::Rig& declared);
 
 /// A number of the term at this place of rig.terms; `scale` as above. One that may not be negative, and is

@@ -14,8 +14,8 @@
 
 namespace backlash::identification {
 
-/// Samples, theory: 95 % reach from a torque that is held to one of the moment, half a sample earlier, which
-/// a record of a later one hides. Counts in the error of a delay.
+/// Samples, theory: half a sample, by which a held torque acts later than one of the moment. A later delay of
+/// the record hides this difference; it is part of the standard error of a delay.
 constexpr double kUnsureOfHold = 0.3;
 
 /// A rig, what is unknown of it, and what belongs to each record.
@@ -36,8 +36,8 @@ struct Weights {
   double torque = 1, deflection = 1;
 };
 
-/// What a machine leaves of the channels of all records: root mean square in units of the noise floor, or of
-/// a negligible part of the signal where that is more.
+/// The residuals of the channels over all records: root mean square in units of the noise floor, or of a
+/// negligible part of the signal if that is larger.
 struct Misfit {
   double torque = 0, deflection = 0;
   double torque_share = 0, deflection_share = 0;  // of the signal's standard deviation instead
@@ -53,7 +53,8 @@ class RecordSet {
  public:
   RecordSet(const std::vector<ServoData>& data, double cutoff, double feedback);
 
-  /// The larger of noise floor and actual residual: a misfit must not overrule what other records say well.
+  /// The larger of noise floor and actual residual, so that a record with a misfit does not outweigh records
+  /// that fit well.
   void weigh(const Machine& machine);
   /// The largest relative difference between a weight of these and of the others, of as many records.
   double difference_of_weights(const RecordSet& other) const;
@@ -89,7 +90,7 @@ struct MachineFit {
   Eigen::VectorXd reach;        // of the errors of small values (reach.h); empty before judge_errors()
 };
 
-/// A positive value over its start at which its bound is reached to a hundredth.
+/// The ratio of a positive value to its start at which its bound counts as reached, to a hundredth.
 double farthest_logarithm();
 
 /// The numbers that a fit changes: parameters (of those that are positive the logarithm, relative to the
@@ -103,7 +104,8 @@ class Unknowns {
   /// Throws InvalidParameter for values that the rig refuses.
   model::Rig rig(const Eigen::VectorXd& values) const;
   std::vector<Calibration> calibrations(const Eigen::VectorXd& values) const;
-  /// One row per value: a wide prior about its start, so that what the records do not determine stays there.
+  /// One row per value: a wide prior about its start, so that values that the records do not determine stay
+  /// there.
   Eigen::VectorXd prior(const Eigen::VectorXd& values) const;
   Machine machine(const Eigen::VectorXd& values) const;
   std::map<std::string, signal::Measured> parameters(const MachineFit& fit) const;
@@ -121,17 +123,17 @@ class Unknowns {
 
 MachineFit fit_machine(const Machine& start, const RecordSet& records, fit::NonlinearOptions options);
 
-/// Takes off what sampling makes of the values (sampling.h), and gives their covariance from the wide steps
-/// of the last fit and from blocks of the records as long as the time between two reversals of the motor, the
-/// larger: until the next reversal what friction and play leave keeps its sign. A part of what was taken off
-/// counts as an error. Of a machine that is coupled to other axes also what is left counts as if it followed
-/// each value.
+/// Subtracts the bias of the values by sampling (sampling.h), part of which counts as an error. The
+/// covariance is the larger of that from the wide steps of the last fit and that from blocks of the records.
+/// Blocks are as long as the time between two reversals of the motor, as the residual of friction and play
+/// keeps its sign until the next reversal. On a machine that is coupled to other axes the residual also
+/// counts as if it followed each value.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
-/// An effect that the model lacks (kShowsMissingEffect) may follow what a value changes, and draws it without
-/// a trace: no value is known better than by what would change the records as much as all that is left of
-/// such channels, or, with all others fitted, as three tenths of it. Nothing is done to a machine that is
-/// coupled: judge_errors() has allowed for it.
+/// A missing effect (kShowsMissingEffect) may have the same shape as the change of the records by one value;
+/// it then shifts that value and leaves no trace in the residual. So the error of a value is at least the
+/// change that would alter the records as much as the whole residual of such channels, or, with all other
+/// values fitted, three tenths of it. Not for a coupled machine: judge_errors() has allowed for it.
 void allow_for_misfit(MachineFit& fit, const RecordSet& records);
 
 }  // namespace backlash::identification

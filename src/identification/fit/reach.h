@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How far a positive value may go before the records contradict it.
+// How large a positive value may become before the records contradict it.
 //
-// The error of a logarithm says nothing of a value near zero, or of one that nothing excites (a play of which
-// one flank only is seen: another play and other zeros of the encoders are the same record). There no slope
-// counts, only what a large step changes: the smallest p' > p with
+// The standard error of a logarithm has no meaning for a value near zero, or for one that the motion does not
+// excite (of a play with one flank pressed: another play with other zeros of the encoders gives the same
+// record). For such values a large step is taken instead of the slope: the smallest p' > p with
 //
 //   min over all other values of |r(p')|^2 - |r(p)|^2 >= (2 g)^2
 //
-// r: the rows of the records, each of variance 1, the other values moved along their columns; g: by how much
-// neighbouring rows that are not independent widen the errors of the other values. (p' - p) / 2 counts as an
-// error.
+// r: the rows of the records, each of variance 1, the other values moved along their columns; g: factor by
+// which the correlation of neighbouring rows enlarges the errors of the other values. (p' - p) / 2 is taken
+// as the standard error.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,9 +21,9 @@ namespace backlash::identification {
 
 using RowsOf = std::function<Eigen::VectorXd(const Eigen::VectorXd& values)>;
 
-/// Of each value of the fit, in its own unit (not of its logarithm): 0 where its error is one of a slope,
-/// infinite where the records contradict no value that a fit may reach. `rows`: of records and priors, of
-/// which the first `count` are of records; `growth`: g.
+/// For each value of the fit, in its own unit (not of its logarithm): 0 if the slope's standard error is
+/// valid, infinite if the records contradict no value within the bounds of the fit. `rows`: of records and
+/// priors, of which the first `count` are of records; `growth`: g.
 Eigen::VectorXd reach_of_values(const MachineFit& fit, const Machine& start, const RowsOf& rows,
                                 Eigen::Index count, double growth);
 

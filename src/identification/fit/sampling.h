@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What sampling does to fitted values: between two samples the motor moves as nobody has recorded, which at a
-// touch or a jump of the torque is no smooth line.
+// Bias of fitted values by sampling: the motion of the motor between two samples is not recorded, and at a
+// touch or a jump of the torque it is not smooth.
 #pragma once
 
 #include "joint_fit.h"
 
 namespace backlash::identification {
 
-/// What a machine with a load of its own gives when it moves nearly as recorded: simulated by its equations
-/// under the recorded torque, which is held or not as the record's is, and a weak control (natural frequency
-/// feedback / 8 pi) of the motor's position. No noise, no rounding. Throws IntegrationError.
+/// The record of a machine with a free load that moves nearly as recorded: simulated under the recorded
+/// torque, held or not as in the record, and a weak position control of the motor (natural frequency feedback
+/// / 8 pi). Without noise and rounding. Throws IntegrationError.
 ServoData sampled_machine(const model::Rig& rig, const ServoData& data, const Calibration& calibration,
                           double feedback);
 
 struct SamplingEffect {
-  Eigen::VectorXd bias;      // fitted values minus true ones that sampling alone makes
-  Eigen::MatrixXd rounding;  // covariance that the resolution of the encoders alone makes
+  Eigen::VectorXd bias;      // fitted minus true values, by sampling alone
+  Eigen::MatrixXd rounding;  // covariance by the resolution of the encoders alone
 };
 
 ///   b = -(J' J)^-1 J' r

@@ -13,8 +13,7 @@ namespace backlash::identification {
 struct ServoResiduals {
   std::shared_ptr<const simulation::DrivenLoad> load;
   std::vector<double> torque, deflection;  // N m, rad
-  // N m, as it is without the low-pass, 0 where dry friction takes any value. Never reads the recorded
-  // torque.
+  // N m, without low-pass, 0 where dry friction may take any value. Never read from the recorded torque.
   std::vector<double> predicted_torque;
   std::vector<double> mesh_torque;  // N m, as terms see it (driven_load.h)
 };
@@ -30,7 +29,7 @@ struct PreparedServo {
   /// `data` must outlive it.
   PreparedServo(const ServoData& data, double cutoff, double feedback);
 
-  /// What a second difference of the motor position sees of the motor's torque [N m].
+  /// The motor's torque [N m], averaged as the second difference of the motor position averages it.
   std::vector<double> acting_torque(const model::Rig& rig, const Calibration& calibration) const;
   /// Safe to call from several threads. Simulated loads are cached: a rig that differs only in parameters
   /// that do not move the load is not simulated again.

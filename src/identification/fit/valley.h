@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Where a fit ends whose values nearly mix.
+// Errors of values that a fit can hardly separate.
 #pragma once
 
 #include <map>
@@ -9,10 +9,11 @@
 
 namespace backlash::identification {
 
-/// Where values nearly mix, the sum of squares has a valley, made rough by standstills and touches of the
-/// load: a fit may end anywhere in it. Fits that begin beside its end show where else. The best is taken; of
-/// the others that leave hardly more, the root mean square of the distance to it is an error of each value,
-/// by its name and in its unit. Empty where the rows distinguish all values.
+/// If values can hardly be separated, the sum of squares has a valley with many small minima (from
+/// standstills and touches of the load), and a fit may end in any of them. So fits are started beside the end
+/// of the first. The best is taken. Over the others with nearly the same residual, the root mean square
+/// distance of each value from the best is its error, by name and in its unit. Empty if the rows separate all
+/// values.
 std::map<std::string, double> search_valley(BandFit& fitted, const FitSettings& settings);
 
 }  // namespace backlash::identification

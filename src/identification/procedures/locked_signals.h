@@ -51,9 +51,9 @@ class LockedSignals {
   /// beside it, as in a closed loop whose torque answers to the noise of the position; at least what chance
   /// may hide.
   double answer() const;
-  /// Whether the motor's torque drives it to and fro between the samples: what the low-pass leaves out of
-  /// torque and steps of the position go together, and the torque is enough to turn a motor of this inertia
-  /// round.
+  /// Whether the motor's torque drives it to and fro between the samples: above the band of the low-pass
+  /// torque and steps of the position are correlated, and the torque is large enough to reverse a motor of
+  /// this inertia within a sample.
   bool chatters(double inertia) const;
   /// What a delay of one sample adds to the torque.
   Eigen::VectorXd delayed_by_sample() const;
@@ -66,7 +66,7 @@ class LockedSignals {
   Eigen::MatrixXd picked(const Eigen::MatrixXd& values) const;
 
  private:
-  /// Samples over which the speed is smooth (servo_data.h): before and after a stop it shows no direction.
+  /// Samples over which the speed is smoothed (servo_data.h); so near to a stop it shows no direction.
   long reach() const;
   std::vector<double> raw_mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const;
   Eigen::VectorXd low_passed(std::vector<double> values) const;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How far effects that the equation of one inertia lacks may have drawn its parameters. A drag that grows
-// with the square of the speed looks like viscous friction less Coulomb friction: it leaves little, and moves
-// both by far more than their errors (omitted variables; Greene 2012, Econometric Analysis, Section 4.3.2).
+// How far effects that the equation of one inertia lacks may have shifted its parameters. A drag that grows
+// with the square of the speed looks like viscous minus Coulomb friction: it leaves a small residual, but
+// shifts both by far more than their standard errors (omitted variables; Greene 2012, Econometric Analysis,
+// Section 4.3.2).
 #pragma once
 
 #include <Eigen/Core>
@@ -17,11 +18,11 @@ using EffectShapes = std::vector<std::vector<double>>;
 std::vector<EffectShapes> likely_effects(const std::vector<double>& time, const std::vector<double>& position,
                                          const std::vector<double>& speed, const std::vector<double>& torque);
 
-/// Of a fit A x = b with these residuals: how far each x may be from the machine's. Effects are added one
-/// after the other, the one that explains most first, as long as one explains a tenth of the squares that are
-/// left. How far each moves x counts by the share that it explains, the furthest of those that leave at most
-/// twice what the best leaves; the steps add up. What none explains may follow A by a tenth. `noise`: norm of
-/// the residuals of a machine that lacks nothing. Each effect has as many rows as A.
+/// For a fit A x = b with these residuals: how far each x may be from the machine's value. Effects are added
+/// one at a time, the best first, as long as it explains a tenth of the remaining squares. At each step the
+/// shift of x counts by the share that the effect explains; among effects that leave at most twice the best
+/// residual the largest shift is taken. Steps add up. Of what no effect explains a tenth is assumed to follow
+/// A. `noise`: norm of the residuals of a machine that lacks nothing. Each effect has as many rows as A.
 Eigen::VectorXd drawn_by_missing(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
                                  const std::vector<Eigen::MatrixXd>& effects, double noise);
 

@@ -33,8 +33,8 @@ record::EvenGrid grid_with_losses(const record::Record& recorded, const std::vec
 OneInertiaSignals one_inertia_signals(const record::EvenGrid& grid, double cutoff, bool gravity,
                                       double smoothed);
 
-/// Low-passed of what shows where the motor slides: the equation is linear, so that what is left out at one
-/// moment does not reach another.
+/// Samples at which the motor does not slide are set to 0 in all columns before the low-pass. As the equation
+/// is linear, they then have no influence on the others.
 std::vector<double> low_pass_sliding(const OneInertiaSignals& s, std::vector<double> x);
 
 }  // namespace backlash::identification

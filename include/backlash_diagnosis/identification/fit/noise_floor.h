@@ -18,7 +18,7 @@
 
 namespace backlash::identification {
 
-/// Times the noise floor, beyond which a channel shows that the machine has an effect that the model lacks.
+/// A residual beyond this many times the noise floor shows that the model lacks an effect.
 constexpr double kShowsMissingEffect = 1.5;  // choice
 
 struct NoiseFloors {

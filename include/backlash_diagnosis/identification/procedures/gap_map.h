@@ -6,14 +6,15 @@
 // load:
 //   d_f(q) = s q + m(q) + g(q)/2 + T_f/k,   d_r(q) = s q + m(q) - g(q)/2 - T_r/k
 //   separation d_f - d_r = g + (T_f + T_r)/k,   mean of both - s q = m + (T_f - T_r)/(2k)
-// g the gap [rad], m the centre line (transmission error, eccentricity, zero of the sensors), s what the
-// motor's scale is off by, averaged over both directions as the thesis does. The load's friction T [N m] at
-// the speed of the run winds the mesh up by T/k: without this correction the gap is too large, by 20 % in
-// configuration 1 of the thesis (friction system minus driver), which is what its unexplained ratio of
+// g the gap [rad], m the centre line (transmission error, eccentricity, zero of the sensors), s the scale
+// error of the motor's position, averaged over both directions as the thesis does. The load's friction T [N
+// m] at the speed of the run winds the mesh up by T/k: without this correction the gap is too large, by 20 %
+// in configuration 1 of the thesis (friction system minus driver), which is what its unexplained ratio of
 // Section 6.3 looks like. The series is g(q) = mean + sum A_n sin(n q + phi_n). Orders are taken one after
 // the other while an F-test (2 parameters, Bonferroni over the orders that are left) finds them at
-// `false_alarm`. What turns with another part than the load, as the pinion does, is found first and taken out
-// of both runs (gap_waves.h): its orders are no whole numbers, and over a turn it averages out.
+// `false_alarm`. Waves that turn with another part than the load, such as the pinion, are estimated first and
+// subtracted from both runs (gap_waves.h): their orders are no whole numbers, and over a turn they average
+// out.
 #pragma once
 
 #include <optional>

@@ -42,9 +42,9 @@ struct OneInertia {
   std::vector<std::string> warnings;
 };
 
-/// One inertia is what a machine is to slow motion: where half the band says another inertia, beyond the
-/// errors of both, what lies in the upper half is another thing (an elastic gear, a drive that chatters), and
-/// the lower one counts, down to `kFewestPeriods` of the cutoff in the record.
+/// A machine is one inertia only in slow motion. If the lower half of the band gives another inertia, beyond
+/// the errors of both, the upper half contains something else (an elastic gear, a drive that chatters); then
+/// the lower half is used, down to `kFewestPeriods` of the cutoff in the record.
 ///
 /// Left out: both ends (one period of the cutoff) and standstill, where friction takes any value between its
 /// bounds: speed below four standard deviations of its noise for longer than a quarter of the filter's memory

@@ -24,7 +24,7 @@ struct ChangeWatchSettings {
   std::vector<WatchSettings> joints;
   int queue = 20000;      // messages waiting at most
   double stale = 2;       // s of wall time without a message
-  double look_share = 1;  // - of the time, that looks may run
+  double look_share = 1;  // - fraction of the time that looks may run
 };
 
 /// Throws InvalidParameter, BadData, MissingInput, CannotWrite (the folder of what is learned).

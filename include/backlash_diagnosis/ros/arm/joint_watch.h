@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One joint, or the joints of an arm, as the change watch sees it: its newest samples, the healthy machine
-// that it learns or is given, and what looks at the samples have found. Samples come from one thread, looks
-// are done in another; what a look computes, the command detect_changes computes in a process of its own.
+// What the change watch keeps of one joint, or of an arm: its newest samples, the healthy machine that it has
+// learned or was given, and the changes that looks have found. Samples come from one thread, looks run in
+// another; a look runs the command detect_changes as a process.
 #pragma once
 
 #include <mutex>
@@ -66,13 +66,13 @@ class JointWatch {
   const std::string& joint() const { return settings_.joint.joint; }
   const WatchSettings& settings() const { return settings_; }
 
-  /// Takes a sample, or what is wrong with a message. True where a look is due from now on. `joint`: of an
-  /// arm.
+  /// Takes a sample, or what is wrong with a message. True if a look has become due. `joint`: which joint of
+  /// an arm.
   bool take(const ros::Time& stamp, const record::ChannelValues& values, const std::string& problem,
             const std::string& topic, std::size_t joint = 0);
 
-  /// Looks, where a look is due: learns the healthy machine, or holds the newest samples against it. Changes
-  /// that are new or better known. Ends with Cancelled where `go_on` says so.
+  /// If a look is due: learns the healthy machine, or compares the newest samples with it. Returns the
+  /// changes that are new or known better. Throws Cancelled if `go_on` demands it.
   std::vector<diagnosis::KnownChange> look(const Progress& go_on);
 
   WatchState state() const;
@@ -90,7 +90,7 @@ class JointWatch {
   std::optional<Task> begin_look();
   std::vector<record::JointRecord> kept() const;
   void write(const std::vector<record::JointRecord>& joints, const std::string& path) const;
-  /// What the command finds in a task's record. Throws what it could not do.
+  /// What detect_changes finds in the record of a task. Throws if it fails.
   diagnosis::ChangeLook found(const Task& task, const Progress& go_on) const;
   void learn(const Task& task, const Progress& go_on);
   std::vector<diagnosis::KnownChange> judge(const Task& task, const diagnosis::ChangeLook& look);
