@@ -111,7 +111,7 @@ TEST(ArmTraverse, NothingIsReportedBesideAJointThatIsNotExplained) {
   std::vector<std::string> warnings;
   const std::vector<JointTraverse> found =
       traverses_of(arm, arm::arm_record(joints, arm.rig, "simulated"), warnings);
-  EXPECT_NE(found[0].estimate.message.find("times the noise are left"), std::string::npos)
+  EXPECT_NE(found[0].estimate.message.find("times the noise is left"), std::string::npos)
       << found[0].estimate.message;
   EXPECT_EQ(found[1].estimate.status, Status::out_of_domain) << found[1].estimate.backlash_angle;
   EXPECT_NE(found[1].estimate.message.find("shoulder"), std::string::npos) << found[1].estimate.message;
