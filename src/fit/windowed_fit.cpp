@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "backlash_diagnosis/base/parallel.h"
 
@@ -28,15 +29,17 @@ double Prior::value(double z) const {
   return factor ? centre * std::exp(spread * z) : centre + spread * z;
 }
 
-/// All windows once for each point that Ceres looks at. Slopes come along with the residuals: the machines
-/// that they need are moved side by side with that of the point.
+/// All windows once for each point that Ceres looks at, with slopes where it asks for them: it goes on from
+/// those points only. The machines that slopes need are moved side by side with that of the point.
 struct Evaluation : ceres::EvaluationCallback {
   WindowedFit& fit;
+  VectorXd looked_at, sloped;  // states of the residuals and of the slopes
   VectorXd state;  // all values in one piece: Ceres orders blocks by their addresses, and sums in that order
   explicit Evaluation(WindowedFit& of) : fit(of) {
     Eigen::Index size = fit.shared.size();
     for (const VectorXd& own : fit.own) size += own.size();
     state.resize(size);
+    looked_at = sloped = VectorXd::Constant(size, std::numeric_limits<double>::quiet_NaN());
     move([](VectorXd& values, double* at) { Eigen::Map<VectorXd>(at, values.size()) = values; });
   }
   template <typename Move>
@@ -48,10 +51,15 @@ struct Evaluation : ceres::EvaluationCallback {
   void take() {
     move([](VectorXd& values, double* at) { values = Eigen::Map<VectorXd>(at, values.size()); });
   }
-  void PrepareForEvaluation(bool, bool new_point) override {
-    if (!new_point) return;
-    take();
-    fit.evaluate();
+  void PrepareForEvaluation(bool slopes, bool new_point) override {
+    if (new_point) take();
+    evaluate(slopes);
+  }
+  void evaluate(bool slopes) {
+    if (looked_at == state && (!slopes || sloped == state)) return;
+    fit.evaluate(slopes ? WindowedFit::Slopes::all : WindowedFit::Slopes::none);
+    looked_at = state;
+    if (slopes) sloped = state;
   }
 };
 
@@ -65,11 +73,12 @@ class OwnCost : public ceres::CostFunction {
   bool Evaluate(const double* const* values, double* residuals, double** slopes) const override {
     const Eigen::Index m = parameter_block_sizes()[0];
     const VectorXd at = Eigen::Map<const VectorXd>(values[0], m);
-    const WindowedFit::Part part = fit_.part_of(window_, at, false);
+    const bool asked = slopes != nullptr && slopes[0] != nullptr;
+    const WindowedFit::Part part =
+        fit_.part_of(window_, at, asked ? WindowedFit::Slopes::own : WindowedFit::Slopes::none);
     if (!part.residual.allFinite() || !part.slopes.allFinite()) return false;
     Eigen::Map<VectorXd>(residuals, num_residuals()) = part.residual;
-    if (slopes != nullptr && slopes[0] != nullptr)
-      Eigen::Map<RowMatrix>(slopes[0], num_residuals(), m) = part.slopes.rightCols(m);
+    if (asked) Eigen::Map<RowMatrix>(slopes[0], num_residuals(), m) = part.slopes.rightCols(m);
     return true;
   }
 
@@ -106,13 +115,13 @@ WindowedFit::WindowedFit(const Windows& windows)
       windows_(&windows),
       parts_(std::size_t(windows.count())) {}
 
-WindowedFit::Part WindowedFit::part_of(int window, const VectorXd& mine, bool with_shared) const {
+WindowedFit::Part WindowedFit::part_of(int window, const VectorXd& mine, Slopes slopes) const {
   const Eigen::Index n = shared.size(), m = mine.size();
   const auto prior = [&](Eigen::Index k) -> const Prior& {
     return k < n ? windows_->shared()[std::size_t(k)] : windows_->own()[std::size_t(k - n)];
   };
   std::vector<Eigen::Index> moved;
-  for (Eigen::Index k = with_shared ? 0 : n; k < n + m; ++k)
+  for (Eigen::Index k = slopes == Slopes::all ? 0 : slopes == Slopes::own ? n : n + m; k < n + m; ++k)
     if (prior(k).spread > 0) moved.push_back(k);
   const int sides = central_ ? 2 : 1;
   const Eigen::Index columns = 1 + sides * Eigen::Index(moved.size());
@@ -131,9 +140,13 @@ WindowedFit::Part WindowedFit::part_of(int window, const VectorXd& mine, bool wi
   return part;
 }
 
-void WindowedFit::evaluate(bool with_shared) {
-  for_each_in_parallel(windows_->count(),
-                       [&](int w) { parts_[std::size_t(w)] = part_of(w, own[std::size_t(w)], with_shared); });
+void WindowedFit::evaluate(Slopes slopes) {
+  for_each_in_parallel(windows_->count(), [&](int w) {
+    Part part = part_of(w, own[std::size_t(w)], slopes);
+    if (slopes == Slopes::none)
+      part.slopes = std::move(parts_[std::size_t(w)].slopes);  // of where they were asked for
+    parts_[std::size_t(w)] = std::move(part);
+  });
 }
 
 void WindowedFit::settle() {
@@ -163,12 +176,12 @@ void WindowedFit::run(const FitOptions& options) {
     return std::all_of(parts_.begin(), parts_.end(),
                        [](const Part& p) { return p.residual.allFinite() && p.slopes.allFinite(); });
   };
-  evaluate(false);
+  evaluate(Slopes::own);
   if (!followed()) return;
   settle();
-  evaluate();
-  if (!followed()) return;
   Evaluation evaluation(*this);
+  evaluation.evaluate(true);
+  if (!followed()) return;
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &evaluation;
   ceres::Problem problem(problem_options);
@@ -202,7 +215,10 @@ void WindowedFit::run(const FitOptions& options) {
   evaluation.take();
   if (summary.IsSolutionUsable()) cost_ = 2 * summary.final_cost;
   central_ = options.central;
-  evaluate();
+  if (central_)
+    evaluate(Slopes::all);
+  else
+    evaluation.evaluate(true);
   central_ = false;
 }
 

@@ -35,11 +35,13 @@ std::string time_text(double time) {
 
 StampVerdict StampChecker::next(double stamp) {
   if (!std::isfinite(stamp)) throw InvalidParameter("time", stamp, "must be finite");
-  if (accepted_ > 0 && stamp < last_) return StampVerdict::backwards;
-  if (accepted_ > 0 && stamp == last_) {
+  if (accepted_ > 0 && stamp <= last_) {
+    if (stamp < last_ && !(last_ - stamp < std::min(intervals_[0], intervals_[1])))
+      return StampVerdict::backwards;
     if (repeated_++ == 0) first_repeated_ = stamp;
     return StampVerdict::repeated;
   }
+  if (accepted_ > 0) intervals_[accepted_ % 2] = stamp - last_;
   last_ = stamp;
   ++accepted_;
   return StampVerdict::accept;

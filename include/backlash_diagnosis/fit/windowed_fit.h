@@ -83,8 +83,9 @@ class WindowedFit {
     Eigen::VectorXd residual;
     Eigen::MatrixXd slopes;  // shared, then own
   };
-  void evaluate(bool with_shared = true);
-  Part part_of(int window, const Eigen::VectorXd& own_values, bool with_shared) const;
+  enum class Slopes { none, own, all };
+  void evaluate(Slopes slopes);
+  Part part_of(int window, const Eigen::VectorXd& own_values, Slopes slopes) const;
   /// Own values of each window, with the shared ones as they are: steps of all together from a poor start
   /// lead astray.
   void settle();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What is allowed in a time base, and what is said about it. One policy for CSV, bags and live topics: a
-// stamp that goes back is refused, a repeated stamp loses the later sample, gaps and jitter are kept and
-// reported.
+// stamp that goes back by an interval is refused, one that repeats or goes back by less loses the later
+// sample, gaps and jitter are kept and reported.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +13,10 @@ namespace backlash::record {
 class Record;
 
 enum class StampVerdict {
-  accept,     ///< later than the stamp accepted before, or the first
-  repeated,   ///< equal to it: drop this sample
-  backwards,  ///< earlier: the data are out of order or the clock jumped
+  accept,    ///< later than the stamp accepted before, or the first
+  repeated,  ///< equal to it, or earlier by less than the two intervals before it (a stamp that jitters):
+             ///< drop this sample
+  backwards,  ///< earlier by more: the data are out of order or the clock jumped
 };
 
 /// Judges stamps one after the other. A stamp that is not accepted does not change what the next is compared
@@ -39,6 +40,7 @@ class StampChecker {
 
  private:
   double last_ = 0, first_repeated_ = 0;
+  double intervals_[2] = {0, 0};  // the last two
   std::size_t accepted_ = 0, repeated_ = 0;
 };
 
