@@ -76,7 +76,7 @@ class OwnCost : public ceres::CostFunction {
     const bool asked = slopes != nullptr && slopes[0] != nullptr;
     const WindowedFit::Part part =
         fit_.part_of(window_, at, asked ? WindowedFit::Slopes::own : WindowedFit::Slopes::none);
-    if (!part.residual.allFinite() || !part.slopes.allFinite()) return false;
+    if (!part.residual.allFinite()) return false;
     Eigen::Map<VectorXd>(residuals, num_residuals()) = part.residual;
     if (asked) Eigen::Map<RowMatrix>(slopes[0], num_residuals(), m) = part.slopes.rightCols(m);
     return true;
@@ -94,7 +94,7 @@ class WindowCost : public ceres::CostFunction {
     *mutable_parameter_block_sizes() = {int(fit.shared.size()), int(fit.own[std::size_t(window)].size())};
   }
   bool Evaluate(const double* const*, double* residuals, double** slopes) const override {
-    if (!part_.residual.allFinite() || !part_.slopes.allFinite()) return false;
+    if (!part_.residual.allFinite()) return false;
     Eigen::Map<VectorXd>(residuals, num_residuals()) = part_.residual;
     const Eigen::Index own = parameter_block_sizes()[1];
     if (slopes != nullptr && slopes[0] != nullptr)
@@ -136,6 +136,8 @@ WindowedFit::Part WindowedFit::part_of(int window, const VectorXd& mine, Slopes 
   for (Eigen::Index i = 0; i < Eigen::Index(moved.size()); ++i) {
     const Eigen::Index k = moved[std::size_t(i)], first = 1 + sides * i;
     part.slopes.col(k) = (r.col(first) - r.col(central_ ? first + 1 : 0)) / (sides * prior(k).step);
+    if (!part.slopes.col(k).allFinite())
+      part.slopes.col(k).setZero();  // a place beside this cannot be followed
   }
   return part;
 }
@@ -173,8 +175,7 @@ void WindowedFit::run(const FitOptions& options) {
   cost_ = std::numeric_limits<double>::infinity();
   // From where a window cannot be followed nothing leads on, and Ceres would write that to the user's screen.
   const auto followed = [&] {
-    return std::all_of(parts_.begin(), parts_.end(),
-                       [](const Part& p) { return p.residual.allFinite() && p.slopes.allFinite(); });
+    return std::all_of(parts_.begin(), parts_.end(), [](const Part& p) { return p.residual.allFinite(); });
   };
   evaluate(Slopes::own);
   if (!followed()) return;
