@@ -40,7 +40,9 @@ constexpr double kMostDriveNoise = 0.03;
 constexpr double kDriveNoise[kWaveformChannels] = {1, 0.4};
 constexpr double kSure = 3;       // standard deviations of the correlation of white noise
 constexpr double kLeftOut = 0.5;  // weight of a window that is said to be left out
-constexpr double kSame = 0.05;    // of the logarithm of two gaps that are one
+// Theory: of a cost of some thousand, a hundredth of a standard error.
+constexpr double kSettledFit = 1e-7;
+constexpr double kSame = 0.05;  // of the logarithm of two gaps that are one
 // Of the swing, what is left beyond noise where the machine is fitted with what a rig file may lack.
 constexpr double kLacking[kWaveformChannels] = {0.01, 0.0006};
 
@@ -53,7 +55,7 @@ struct Look {
 };
 constexpr Look kSearch[] = {{3, 0.1, 6}, {3, 0.03, 6}, {5, 0.03, 5}};
 constexpr Look kMiddle[] = {{8, 0.01, 8}, {12, 0.004, 8}};
-constexpr Look kLast = {12, 0, 15};
+constexpr Look kLast = {12, 0, 40};
 
 /// A machine fitted to some windows.
 struct Fitted {
@@ -133,6 +135,7 @@ class Solver {
     fit::FitOptions options;
     options.iterations = look.iterations;
     options.central = look.noise == 0;
+    if (look.noise == 0) options.tolerance = kSettledFit;
     f.fit.run(options);
   }
 

@@ -13,9 +13,9 @@ namespace backlash::record {
 class Record;
 
 enum class StampVerdict {
-  accept,    ///< later than the stamp accepted before, or the first
-  repeated,  ///< equal to it, or earlier by less than the two intervals before it (a stamp that jitters):
-             ///< drop this sample
+  accept,     ///< later than the stamp accepted before, or the first
+  repeated,   ///< equal to it, or earlier by less than the two intervals before it (a stamp that jitters):
+              ///< drop this sample
   backwards,  ///< earlier by more: the data are out of order or the clock jumped
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <string>
 
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "balance.h"
@@ -26,7 +27,7 @@ std::size_t unknowns(const Candidate& c) {
 
 /// Those that convince in blocks that their size was not taken from, best first; of those that tie the
 /// simplest.
-std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& context) {
+std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& context, std::size_t lobes) {
   const SearchSettings& settings = context.settings;
   const AcceptanceSettings& acceptance = settings.acceptance;
   const Balance balance(h.fitted->fit.machine, context.data,
@@ -38,8 +39,14 @@ std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& co
   const MachineFit& fit = h.fitted->fit;
   const OrthogonalPart left(fit, Eigen::Index(h.fitted->records.layout().size()));
   const ResidualOrders orders(fit, h.fitted->records, left);
-  for (const Candidate& c :
+  std::vector<Candidate> candidates;
+  for (const Candidate& screened :
        screen(fit.machine.rig, orders, context.range, settings.screen, balance.left(), column)) {
+    const auto near = lobes > 0 ? with_orders_near(screened, lobes, context.range, balance.left(), column)
+                                : std::vector<Candidate>{screened};
+    candidates.insert(candidates.end(), near.begin(), near.end());
+  }
+  for (const Candidate& c : candidates) {
     if (all.size() >= settings.trials.most) break;
     const auto terms = probed_terms(c);
     Eigen::MatrixXd columns(balance.left().size(), Eigen::Index(terms.size()));
@@ -106,7 +113,7 @@ std::optional<Hypothesis> with_effect(const Hypothesis& h, const Effect& effect,
 /// Fitted with the machine, the best of those that explain nearly as much of the same channel; of those that
 /// come to the same the simplest. Both sums hardly show on which body a friction acts or which wave the
 /// flanks have, and the motion of the load does.
-std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain>& plain,
+std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain>& plain, std::size_t lobes,
                                     const SearchContext& context) {
   const SearchSettings& settings = context.settings;
   const Plain& first = plain.front();
@@ -122,8 +129,13 @@ std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain
   if (fitted.empty()) return std::nullopt;
   const auto least = std::min_element(fitted.begin(), fitted.end(),
                                       [](const auto& a, const auto& b) { return size(a) < size(b); });
-  const double enough = settings.revision.as_good * size(*least);
-  fitted.erase(std::remove_if(fitted.begin(), fitted.end(), [&](const auto& f) { return size(f) > enough; }),
+  const double smallest = size(*least), enough = settings.revision.as_good * smallest;
+  const std::string id = least->effects.back().candidate.id;
+  fitted.erase(std::remove_if(fitted.begin(), fitted.end(),
+                              [&](const auto& f) {  // of one effect with several orders the best
+                                const bool other_order = lobes > 1 && f.effects.back().candidate.id == id;
+                                return size(f) > (other_order ? smallest : enough);
+                              }),
                fitted.end());
   return *std::min_element(fitted.begin(), fitted.end(), [](const auto& a, const auto& b) {
     return unknowns(a.effects.back().candidate) < unknowns(b.effects.back().candidate);
@@ -132,12 +144,12 @@ std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain
 
 }  // namespace
 
-Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context) {
+Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context, std::size_t lobes) {
   if (!simulation::load_moves_freely(h.declared->rig)) return h;
   context.report("looking at the balance of torques and at the pressed flanks");
-  const std::vector<Plain> plain = plain_candidates(h, context);
+  const std::vector<Plain> plain = plain_candidates(h, context, lobes);
   if (plain.empty()) return h;
-  const auto with = with_best(h, plain, context);
+  const auto with = with_best(h, plain, lobes, context);
   const auto left = [&](const Hypothesis& of) {
     return plain.front().explained.deflection ? misfit(of).deflection : misfit(of).torque;
   };

@@ -13,6 +13,10 @@
 namespace backlash::identification {
 namespace {
 
+// Choice (time): of a wave, orders that are fitted. The spectrum is of slow motion, and a joint that moves
+// between few places has lobes as high as the order itself: the unseen record shows that it was another.
+constexpr std::size_t kLobes[] = {0, 1, 3};
+
 /// What is reported on the way: a share that never falls back when effects are taken out again, and the best
 /// so far.
 class SearchProgress {
@@ -65,16 +69,17 @@ Hypothesis believe_all(const Hypothesis& before, const Hypothesis& declared, con
 }
 
 /// What two encoders show plainly, one effect after the other, as long as the unseen record bears all of them
-/// out: one that is not there would spoil those before it. Or no more than every machine has.
-std::optional<Hypothesis> plain_effects(const Hypothesis& declared, const ServoData& unseen,
-                                        const SearchContext& context) {
+/// out: one that is not there would spoil those before it. Or no more than every machine has. Adds why others
+/// were rejected.
+std::optional<Hypothesis> plain_effects(Hypothesis& declared, const ServoData& unseen,
+                                        const SearchContext& context, std::size_t lobes) {
   const auto named = [](const Hypothesis& h) {
     return std::any_of(h.effects.begin(), h.effects.end(),
                        [&](const Effect& effect) { return !is_usual(effect.candidate, h.declared->rig); });
   };
   std::optional<Hypothesis> found;
   for (Hypothesis h = declared; h.effects.size() < context.settings.asked.most_effects;) {
-    const Hypothesis more = add_plain_effect(h, context);
+    const Hypothesis more = add_plain_effect(h, context, lobes);
     if (more.effects.size() == h.effects.size()) break;
     h = more;
     const Hypothesis whole = add_shape_of_friction(h, context);
@@ -83,6 +88,7 @@ std::optional<Hypothesis> plain_effects(const Hypothesis& declared, const ServoD
       continue;
     }
     const Hypothesis believed = believe_all(whole, declared, unseen, context);
+    declared.rejected = believed.rejected;
     const bool all = believed.effects.size() == whole.effects.size();
     if (!all && found && named(*found)) return found;
     if (named(believed))
@@ -108,9 +114,14 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
     result.found = believe_compliance(result.declared, unseen, context);
     return result;
   }
-  if (const auto plain = plain_effects(result.declared, unseen, context)) {
-    result.found = *plain;
-    return result;
+  for (const std::size_t lobes : kLobes) {
+    if (lobes > 0 && result.declared.rejected.empty()) break;  // nothing that another order could mend
+    const auto plain = plain_effects(result.declared, unseen, context, lobes);
+    const double most = settings.acceptance.near_floor;  // another order must leave nothing else
+    if (plain && (lobes == 0 || std::max(misfit(*plain).torque, misfit(*plain).deflection) < most)) {
+      result.found = *plain;
+      return result;
+    }
   }
   Hypothesis h = add_effects_or_teeth(result.declared, context);
   h = drop_superfluous(h, context);

@@ -20,7 +20,8 @@ bool is_usual(const Candidate& candidate, const model::Rig& rig);
 Hypothesis add_shape_of_friction(const Hypothesis& h, const SearchContext& context);
 
 /// One more named effect, that which two encoders show plainly to explain most; none of a machine with one.
-Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context);
+/// Waves have the order that the spectrum shows, or so many of those near it (`lobes` > 0) that explain most.
+Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context, std::size_t lobes);
 
 /// One more named effect: the first of the best trials that convinces and that the machine can be fitted
 /// with.
