@@ -65,7 +65,9 @@ void look_at_jitter(RecordLook& look, const std::vector<std::size_t>& rows) {
     ++count;
   }
   look.out.stamps.jitter = count > 0 ? std::sqrt(squares / double(count)) : 0;
-  if (look.out.stamps.jitter < kJitters) return;
+  const bool seen = std::any_of(kEncoders.begin(), kEncoders.end(),
+                                [&](Channel channel) { return look.record.has(channel); });
+  if (look.out.stamps.jitter < kJitters || !seen) return;
   SamplingTimes times = sampling_times(look.record);
   look.out.stamps.of_stamps_only = times.stamped < 0.5;
   look.out.stamps.unsure = times.unsure / look.interval;

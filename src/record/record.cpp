@@ -119,6 +119,7 @@ Record samples_at(const Record& record, const std::vector<double>& times) {
   Record part;
   part.name = record.name;
   part.warnings = record.warnings;
+  part.unsure_time = record.unsure_time;
   part.origin = record.origin;
   part.time = times;
   std::size_t k = 0;

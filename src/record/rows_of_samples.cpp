@@ -19,6 +19,7 @@ constexpr double kHopeless = 100;   // cost beyond the best, from which no way c
 // fifth leaves 0.05 of an interval of its phase.
 constexpr double kFollow = 0.1, kFollowRate = kFollow * kFollow / 4;
 constexpr double kMostFollowed = 0.5;  // intervals: choice
+constexpr double kShortest = 0.1;      // median intervals: choice
 constexpr double kShort = 1.25;        // theory: half of what a lost sample adds to two intervals
 constexpr double kNormal = 1.4826;     // theory: deviation over median distance
 
@@ -38,7 +39,8 @@ Count extended(const Count& from, std::size_t which, double time, std::size_t ro
   Count to;
   to.row = from.row + rows, to.before = which;
   to.cost = from.cost + std::min(kOutlier, std::pow(off / jitter, 2)) + (rows > 1 ? kLossCost : 0);
-  to.interval = from.interval + kFollowRate * followed;
+  const bool near = followed == off;  // what is further off says nothing of the rate
+  to.interval = std::max(kShortest, from.interval + (near ? kFollowRate * off : 0));
   to.expected = time - off + kFollow * followed + to.interval;
   return to;
 }
