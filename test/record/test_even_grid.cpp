@@ -61,14 +61,6 @@ TEST(EvenGrid, LateSamplesAreNotLost) {
   }
 }
 
-// A record whose rate doubles stands on the rows of the faster rate.
-TEST(EvenGrid, SamplesAreCountedWhereTheRateDoubles) {
-  std::vector<double> times = {0};
-  for (int i = 1; i < 20000; ++i) times.push_back(times.back() + (i < 10000 ? 1 : 0.5));
-  const std::vector<std::size_t> rows = rows_of_samples(times, 1);
-  for (std::size_t i = 0; i < times.size(); ++i) ASSERT_EQ(double(rows[i]), times[i] / 0.5) << i;
-}
-
 // A cubic is its own interpolation, but beside the ends, where it is a line; a torque that jumps does not
 // overshoot.
 TEST(EvenGrid, APositionGoesOnAsItWas) {
