@@ -3,6 +3,7 @@
 // of all ways to count that lead to a row the one whose stamps are off the least is kept.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "backlash_diagnosis/record/even_grid.h"
@@ -21,6 +22,7 @@ constexpr double kFollow = 0.1, kFollowRate = kFollow * kFollow / 4;
 constexpr double kMostFollowed = 0.5;  // intervals: choice
 constexpr double kShortest = 0.1;      // median intervals: choice
 constexpr double kShort = 1.25;        // theory: half of what a lost sample adds to two intervals
+constexpr int kPairPasses = 3;         // choice: under jitter of a fifth one hundredth is left of the bias
 constexpr double kNormal = 1.4826;     // theory: deviation over median distance
 
 /// A way to count up to a sample.
@@ -82,9 +84,14 @@ double usual_interval(const std::vector<double>& time, double interval) {
   std::vector<double> pairs;
   for (std::size_t i = 0; i + 2 < time.size(); ++i) pairs.push_back((time[i + 2] - time[i]) / (2 * interval));
   if (pairs.empty()) return 1;
-  const double longest = kShort * signal::quantile(pairs, 0.25);
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), [&](double p) { return p > longest; }), pairs.end());
-  return signal::median(std::move(pairs));
+  double usual = signal::quantile(pairs, 0.25);
+  for (int pass = 0; pass < kPairPasses; ++pass) {
+    std::vector<double> of_two;
+    std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(of_two),
+                 [&](double pair) { return pair <= kShort * usual; });
+    usual = signal::median(std::move(of_two));
+  }
+  return usual;
 }
 
 }  // namespace

@@ -131,6 +131,38 @@ TEST(EvenGrid, SamplesThatAreLateAndStampedLateAsWell) {
   EXPECT_EQ(sampling_times(r).time, times.time);  // once is enough
 }
 
+// Of motor and load, which swing against each other at 40 Hz, as heavy as each other: their mean is smooth,
+// so that it shows each sample's own time but for what is as slow as a parabola over nine samples (0.255 of
+// the variance) and the speed does not show about its turns. Without the load's encoder nothing shows it.
+TEST(EvenGrid, BothPositionsShowWhenASampleWasTaken) {
+  for (const bool both : {false, true}) {
+    Random random(4);
+    Record r;
+    std::vector<double> taken, rate;
+    for (int i = 0; i < 8000; ++i) {
+      const double late = 0.05 * random.normal(), stamped = 0.2 * random.normal();
+      r.time.push_back(2e-3 * (i + std::clamp(late + stamped, -0.49, 0.49)));
+      taken.push_back(2e-3 * (i + late));
+      const double slow = 2 * M_PI * 0.5, fast = 2 * M_PI * 40, swing = 2e-4 * std::sin(fast * taken.back());
+      const double mean = 0.3 * std::sin(slow * taken.back());
+      r.column(Channel::motor_position).push_back(mean + swing);
+      if (both) r.column(Channel::load_position).push_back(mean - swing);
+      rate.push_back(std::cos(slow * taken.back()));
+    }
+    const SamplingTimes times = sampling_times(r);
+    EXPECT_EQ(rows_of_samples(r.time, r.sampling_interval()).back(), 7999u);
+    double squares = 0, count = 0;
+    for (std::size_t i = 10; i + 10 < taken.size(); ++i)
+      if (std::fabs(rate[i]) > 0.5) squares += std::pow(times.time[i] - taken[i], 2), ++count;
+    const double left = std::sqrt(squares / count) / 2e-3;
+    if (both)
+      EXPECT_NEAR(left, 0.0485 * std::sqrt(0.255), 0.004);
+    else
+      EXPECT_NEAR(left, 0.0485, 0.004);
+    EXPECT_NEAR(times.unsure / 2e-3, left, 0.008);  // of a share of 0.059 +- 0.01, the larger
+  }
+}
+
 // A straight line is its own interpolation.
 TEST(EvenGrid, AStretchThatBeginsBetweenTheRowsIsInterpolated) {
   const EvenGrid even = even_grid(line({0, 1, 2, 3, 6.4, 7.4, 8.4, 9.4, 10}));
