@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/record/even_grid.h"
+#include "backlash_diagnosis/signal/local_parabola.h"
 #include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
@@ -35,32 +36,11 @@ constexpr double kEnd = 0.02;    // share of the samples at either end of a rang
 constexpr double kShown = 5e-5;  // rad, of an encoder, beside its eccentricity: 10 seconds of arc
 constexpr double kOffInTime =
     0.05;  // of the range of motor minus load position, as the rms joint moves: choice
-constexpr double kSecondDifference = 2.45;   // theory: sqrt(6), of the noise of a sample
 constexpr double kUntracked = 0.1;           // of the usual torque, on the load
 constexpr double kRough = 0.1, kFaster = 4;  // of the range; times the rate, that would show more
 constexpr double kTile = 6;                  // cycles, of a window with the load's encoder
 constexpr std::size_t kFewestTile = 48;      // samples, of it
 constexpr std::size_t kFirst = 3;            // samples, that differences and delays need
-
-/// Value and slope per sample of a quadratic over `reach` samples to each side (Savitzky and Golay 1964).
-struct Quadratic {
-  std::vector<double> value, slope;
-  std::size_t reach;
-
-  explicit Quadratic(std::size_t to_each_side) : reach(to_each_side) {
-    const auto m = static_cast<double>(reach);
-    for (double k = -m; k <= m; ++k) {
-      value.push_back((3 * (3 * m * m + 3 * m - 1) - 15 * k * k) / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3)));
-      slope.push_back(3 * k / (m * (m + 1) * (2 * m + 1)));
-    }
-  }
-
-  double of(const std::vector<double>& x, std::size_t i, const std::vector<double>& weights) const {
-    double sum = 0;
-    for (std::size_t k = 0; k < weights.size(); ++k) sum += weights[k] * x[i + k - reach];
-    return sum;
-  }
-};
 
 /// What the weights leave of the noise of a torque of which two samples are averaged, and of second
 /// differences of positions [N m].
@@ -114,7 +94,7 @@ struct Presses {
   std::vector<int> flank, sure;
 };
 
-Presses presses_of(TraverseData& d, const std::vector<double>& teeth, const Quadratic& quadratic,
+Presses presses_of(TraverseData& d, const std::vector<double>& teeth, const signal::LocalParabola& quadratic,
                    double unsure) {
   const std::size_t n = teeth.size(), reach = quadratic.reach;
   Presses p{std::vector<double>(n, 0.0), std::vector<int>(n, 0), std::vector<int>(n, 0)};
@@ -195,7 +175,7 @@ std::size_t count_within(const std::vector<Turn>& turns, const TraverseData& d) 
 }
 
 void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycle, double unsure) {
-  const Quadratic quadratic(reach_of(d, cycle));
+  const signal::LocalParabola quadratic(reach_of(d, cycle));
   const Presses presses = presses_of(d, teeth, quadratic, unsure);
   const std::vector<Turn> turns = turns_of(presses.flank);
   d.crossings = turns.size();
@@ -258,7 +238,7 @@ TraverseData motor_of(const record::EvenGrid& even, const GapTraverseSettings& s
 
 /// Rate of the load by a quadratic, and how much the record says of the torque that moves it.
 void read_load(TraverseData& d, const record::EvenGrid& even, const GapTraverseSettings& settings,
-               const Quadratic& quadratic, std::vector<double>& rate) {
+               const signal::LocalParabola& quadratic, std::vector<double>& rate) {
   d.load = even.record.column(record::Channel::load_position);
   const std::size_t n = d.load.size(), reach = quadratic.reach;
   std::vector<double> apart(n);
@@ -309,7 +289,7 @@ TraverseData traverse_data_by_load(const record::Record& recorded, const GapTrav
   const record::EvenGrid even = record::even_grid(recorded);
   TraverseData d = motor_of(even, settings, kCycleSamplesByLoad);
   const double cycle = cycle_of(settings) / d.interval;
-  const Quadratic quadratic(std::max<std::size_t>(3, reach_of(d, cycle_of(settings))));
+  const signal::LocalParabola quadratic(std::max<std::size_t>(3, reach_of(d, cycle_of(settings))));
   std::vector<double> rate;
   read_load(d, even, settings, quadratic, rate);
   d.samples = std::max<std::size_t>(kFewestTile, std::size_t(std::lround(kTile * cycle)));
@@ -352,12 +332,13 @@ TraverseData traverse_data(const record::Record& recorded, const GapTraverseSett
   const double cycle = cycle_of(settings);
   const std::vector<double> teeth = torque_of_teeth(d, motor);
   d.torque_noise = signal::noise_from_differences(d.torque, 2);
-  const Quadratic quadratic(reach_of(d, cycle));
+  const signal::LocalParabola quadratic(reach_of(d, cycle));
   const double differences = motor.inertia * d.position_noise / (d.interval * d.interval);
   d.noise = noise_of(quadratic.value, d.torque_noise, differences);
   d.slope_noise = noise_of(quadratic.slope, d.torque_noise, differences) / d.interval;
   find_windows(d, teeth, cycle, motor.unsure);
-  if (kSecondDifference * motor.inertia * d.unsure_place / (d.interval * d.interval) > d.level)
+  // Second differences have sqrt(6) times the noise of a sample.
+  if (std::sqrt(6) * motor.inertia * d.unsure_place / (d.interval * d.interval) > d.level)
     throw unsure_times(even.record.unsure_time, d.unsure_place);
   if (settings.load_torque)
     for (TraverseWindow& w : d.windows)

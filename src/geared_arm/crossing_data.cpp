@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/arm/dynamics.h"
 #include "backlash_diagnosis/geared_arm/drive_effects.h"
 #include "backlash_diagnosis/record/resampling.h"
+#include "backlash_diagnosis/signal/local_parabola.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash::geared_arm {
@@ -26,22 +27,15 @@ constexpr double kLongest = 1.5;         // s
 constexpr double kUnsureFriction = 0.7;  // of the motor's dry friction, about a standstill
 constexpr double kStandstill = 3;        // friction speeds
 
-/// Value and slope of a quadratic over `reach` samples to each side (Savitzky and Golay 1964).
+/// Value and slope of the parabola about each sample, at either end of the nearest one.
 void smooth(const std::vector<double>& x, Eigen::Index reach, double interval, Eigen::Index j,
             Eigen::MatrixXd& value, Eigen::MatrixXd& slope) {
   const auto n = Eigen::Index(x.size());
-  const auto m = double(reach);
+  const signal::LocalParabola parabola{std::size_t(reach)};
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::Index middle = std::clamp(i, reach, n - 1 - reach);
-    double sum = 0, rise = 0;
-    for (Eigen::Index k = -reach; k <= reach; ++k) {
-      const double at = x[std::size_t(middle + k)] - x[std::size_t(middle)];
-      sum +=
-          at * (3 * (3 * m * m + 3 * m - 1) - 15 * double(k * k)) / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3));
-      rise += at * 3 * double(k) / (m * (m + 1) * (2 * m + 1));
-    }
-    value(i, j) = i == middle ? x[std::size_t(middle)] + sum : x[std::size_t(i)];
-    slope(i, j) = rise / interval;
+    value(i, j) = i == middle ? parabola.of(x, std::size_t(middle), parabola.value) : x[std::size_t(i)];
+    slope(i, j) = parabola.of(x, std::size_t(middle), parabola.slope) / interval;
   }
 }
 

@@ -23,7 +23,6 @@ constexpr double kMostFollowed = 0.5;  // intervals: choice
 constexpr double kShortest = 0.1;      // median intervals: choice
 constexpr double kShort = 1.25;        // theory: half of what a lost sample adds to two intervals
 constexpr int kPairPasses = 3;         // choice: under jitter of a fifth one hundredth is left of the bias
-constexpr double kNormal = 1.4826;     // theory: deviation over median distance
 
 /// A way to count up to a sample.
 struct Count {
@@ -75,7 +74,8 @@ double jitter_of(const std::vector<double>& time, double interval) {
   std::vector<double> off;
   for (std::size_t i = 0; i + 1 < time.size(); ++i)
     off.push_back(std::fabs((time[i + 1] - time[i]) / interval - 1) / std::sqrt(2.0));
-  return std::max(kLeastJitter, off.empty() ? 0 : kNormal * signal::median(std::move(off)));
+  return std::max(kLeastJitter,
+                  off.empty() ? 0 : signal::kNormalPerMedianDeviation * signal::median(std::move(off)));
 }
 
 /// In intervals, over two: where early and late samples take turns the median of one is that of either. Where

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/signal/local_parabola.h"
 #include "sample_grid.h"
 
 namespace backlash::record {
@@ -12,15 +13,23 @@ constexpr double kSureOff = 3;  // theory: standard errors, within which nothing
 // Theory: third differences of white noise follow one another with -0.75, 0.3 and -0.05, which multiplies an
 // error by up to sqrt(1 + 2 (0.75 + 0.3 + 0.05)).
 constexpr double kNeighbours = 1.79;
-constexpr int kPasses = 4;         // choice: each leaves a tenth of the error of the share before
-constexpr double kExact = 1e-12;   // of the squares, that rounding leaves
-constexpr std::size_t kReach = 4;  // choice: samples to each side, over which the motion is a parabola
-constexpr double kWithin = 0.25;   // choice: of an interval, by which no sample passes its neighbour
-constexpr double kMostLate = 3;    // theory: deviations, beyond which a sample is late by no chance
+constexpr int kPasses = 4;          // choice: each leaves a tenth of the error of the share before
+constexpr double kExact = 1e-12;    // of the squares, that rounding leaves
+constexpr std::size_t kAcross = 3;  // theory: rows of a third difference of rates
+constexpr std::size_t kReach = 4;   // choice: samples to each side, over which the motion is a parabola
+constexpr double kWithin = 0.25;    // choice: of an interval, by which no sample passes its neighbour
+constexpr double kMostLate = 3;     // theory: deviations, beyond which a sample is late by no chance
 
 /// Third difference about y[k] and y[k + 1].
 double rough(const std::vector<double>& y, std::size_t k) {
   return y[k + 2] - 3 * y[k + 1] + 3 * y[k] - y[k - 1];
+}
+
+/// Whether all samples from `reach` before to `reach` after row k were recorded.
+bool whole(const SampleGrid& g, std::size_t k, std::size_t reach) {
+  const auto from = g.lost.begin() + std::ptrdiff_t(k - reach),
+             to = g.lost.begin() + std::ptrdiff_t(k + reach + 1);
+  return std::find(from, to, true) == to;
 }
 
 /// Sums of a regression through the origin.
@@ -33,26 +42,17 @@ struct Slope {
 void add_share(Slope& all, const SampleGrid& g, const std::vector<double>& off,
                const std::vector<double>& y) {
   Slope slope;
-  const auto beside = [&](std::size_t k) { return off[k] * (y[k + 1] - y[k - 1]); };
-  const double rate = 0.5 / (g.time[1] - g.time[0]);
-  for (std::size_t k = 2; k + 3 < y.size(); ++k) {
-    if (std::any_of(g.lost.begin() + std::ptrdiff_t(k) - 2, g.lost.begin() + std::ptrdiff_t(k) + 4,
-                    [](bool lost) { return lost; }))
-      continue;
-    const double b = rough(y, k),
-                 a = rate * (beside(k + 2) - 3 * beside(k + 1) + 3 * beside(k) - beside(k - 1));
+  std::vector<double> shown(y.size(), 0.0);
+  for (std::size_t k = 1; k + 1 < y.size(); ++k)
+    shown[k] = off[k] * (y[k + 1] - y[k - 1]) / (2 * (g.time[1] - g.time[0]));
+  for (std::size_t k = kAcross; k + kAcross < y.size(); ++k) {
+    if (!whole(g, k, kAcross)) continue;
+    const double b = rough(y, k), a = rough(shown, k);
     slope.xx += a * a, slope.xy += a * b, slope.yy += b * b, ++slope.count;
   }
   if (!(slope.xx > 0)) return;
   const double noise = std::max(slope.yy - slope.xy * slope.xy / slope.xx, kExact * slope.yy) / slope.count;
   all.xx += slope.xx / noise, all.xy += slope.xy / noise;
-}
-
-/// Of all samples within reach.
-bool whole(const SampleGrid& g, std::size_t k, std::size_t reach) {
-  const auto from = g.lost.begin() + std::ptrdiff_t(k - reach),
-             to = g.lost.begin() + std::ptrdiff_t(k + reach + 1);
-  return std::find(from, to, true) == to;
 }
 
 /// The mean of both positions in which motor and load, as they swing against each other, cancel: the centre
@@ -69,26 +69,22 @@ std::vector<double> centre_of(const std::vector<double>& motor, const std::vecto
   return centre;
 }
 
-/// What the centre of inertia is off a parabola through its neighbours is its rate times what the sample was
-/// late, and noise; which of them grows with the rate.
+/// A sample that is late by t is off the parabola through its neighbours by the rate of the centre of inertia
+/// times t. What is off at any rate is noise: a regression of the squares on those of the rate separates
+/// both.
 SamplingTimes by_motion(const Record& record, const SampleGrid& g, SamplingTimes times) {
   if (!record.has(Channel::motor_position) || !record.has(Channel::load_position)) return times;
   const std::vector<double> centre =
       centre_of(at_rows(g, times.time, record.column(Channel::motor_position), true),
                 at_rows(g, times.time, record.column(Channel::load_position), true));
-  const double m = double(kReach), interval = g.time[1] - g.time[0];
+  const signal::LocalParabola parabola(kReach);
+  const double interval = g.time[1] - g.time[0], slow = parabola.value[kReach];
   std::vector<double> off(centre.size(), 0.0), rate(centre.size(), 0.0);
   double n = 0, vv = 0, vvvv = 0, rr = 0, vvrr = 0;
   for (std::size_t k = kReach; k + kReach < centre.size(); ++k) {
     if (!whole(g, k, kReach)) continue;
-    double smooth = 0;
-    for (std::size_t i = k - kReach; i <= k + kReach; ++i) {  // Savitzky and Golay 1964
-      const double j = double(i) - double(k);
-      smooth +=
-          centre[i] * (3 * (3 * m * m + 3 * m - 1) - 15 * j * j) / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3));
-      rate[k] += centre[i] * 3 * j / (m * (m + 1) * (2 * m + 1)) / interval;
-    }
-    off[k] = centre[k] - smooth;
+    rate[k] = parabola.of(centre, k, parabola.slope) / interval;
+    off[k] = centre[k] - parabola.of(centre, k, parabola.value);
     const double v = rate[k] * rate[k], r = off[k] * off[k];
     ++n, vv += v, vvvv += v * v, rr += r, vvrr += v * r;
   }
@@ -105,8 +101,7 @@ SamplingTimes by_motion(const Record& record, const SampleGrid& g, SamplingTimes
     if (v > 0) times.time[i] += std::clamp(known * off[k] / rate[k], -most, most);
     unknown += v * (1 - known);
   }
-  // What is slow beside the parabola is not seen: the share of a sample in its own smooth value.
-  const double slow = 3 * (3 * m * m + 3 * m - 1) / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3));
+  // The parabola follows what all its samples are late by, and of one sample alone the share `slow`.
   times.unsure *= std::sqrt(slow + (1 - slow) * unknown / std::max(vv, unknown));
   return times;
 }

@@ -265,6 +265,30 @@ TEST(GapTraverse, RecordsThatCannotServeAreAnswered) {
   EXPECT_NE(coarse.message.find("does not resolve"), std::string::npos) << coarse.message;
 }
 
+// What the joint moves while the time of a sample is not known widens the interval, or is too much: at rms
+// speeds of these motions of 0.3 to 3 rad/s a hundred thousandth of a second is 3 to 30 urad, and a tenth of
+// one is more than all of the play.
+TEST(GapTraverse, TimesThatAreNotKnownWidenTheIntervalOrAreTooMuch) {
+  Servo servo;
+  servo.load_step = 7e-6;
+  record::Record r = servo.record();
+  r.unsure_time = 0;
+  const Estimate sure = estimate_gap_traverse(r, declared());
+  r.unsure_time = 1e-5;
+  const Estimate unsure = estimate_gap_traverse(r, declared());
+  ASSERT_EQ(sure.status, Status::ok) << sure.message;
+  ASSERT_EQ(unsure.status, Status::ok) << unsure.message;
+  EXPECT_EQ(unsure.backlash_angle, sure.backlash_angle);
+  EXPECT_LT(unsure.angle_lower, sure.angle_lower);
+  EXPECT_GT(unsure.angle_upper, sure.angle_upper);
+  r.unsure_time = 0.1;
+  const Estimate refused = estimate_gap_traverse(r, declared());
+  EXPECT_EQ(refused.status, Status::out_of_domain);
+  EXPECT_NE(refused.message.find("stamps of the sampling"), std::string::npos) << refused.message;
+  r.column(record::Channel::load_position).clear();
+  EXPECT_EQ(estimate_gap_traverse(r, declared()).message, refused.message);
+}
+
 TEST(GapTraverse, SettingsOutOfRangeThrow) {
   const record::Record record;
   for (double GapTraverseSettings::*value :

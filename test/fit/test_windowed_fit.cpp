@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <limits>
 
 #include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/fit/windowed_fit.h"
@@ -134,6 +135,27 @@ class Decay : public Windows {
   Priors shared_ = {{"rate", 1, 2, true}, {"height", 1, 0, false}};
   Priors own_ = {{"level", 0, 1, false}};
 };
+
+/// Lines of which the first window cannot be followed.
+class Unfollowed : public Lines {
+ public:
+  using Lines::Lines;
+  MatrixXd residuals(int w, const MatrixXd& shared, const MatrixXd& own) const override {
+    MatrixXd r = Lines::residuals(w, shared, own);
+    if (w == 0) r.array() *= std::numeric_limits<double>::quiet_NaN();
+    return r;
+  }
+};
+
+// Ceres would write an error to the screen of whoever asked for a diagnosis.
+TEST(WindowedFit, WhereAWindowCannotBeFollowedNothingIsFoundAndNothingIsWritten) {
+  const Unfollowed windows(3, 0.5);
+  WindowedFit fit(windows);
+  testing::internal::CaptureStderr();
+  fit.run({});
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_TRUE(std::isinf(fit.cost()));
+}
 
 TEST(WindowedFit, AFactorIsFoundAndWhatIsKnownStays) {
   const Decay decay;

@@ -49,7 +49,9 @@
 //
 // Needs motor_position, and load_position or motor_torque. Samples are put on an even grid
 // (record/even_grid.h), of at least two samples in a cycle of the motor against the load, four by the motor
-// alone. No period.
+// alone. No period. Refused where the joint moves by more than a twentieth of the range of motor minus load
+// position while the time of a sample is not known; by the motor alone where that makes its inertia take more
+// than T0.
 #pragma once
 
 #include <cmath>
