@@ -20,7 +20,7 @@ struct ChainEffect {
   int values = 1;
 
   /// Of the effect at one joint, in SampledMotion::known_columns.
-  ChangeEffect at_joint() const { return {id, double(joint + 1), {}}; }
+  ChangeEffect at_joint() const { return {id, double(joint + 1)}; }
 };
 
 /// A payload at each link, the last first; each encoder.

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/model/axis_unit.h"
-#include "backlash_diagnosis/model/term.h"
+#include "backlash_diagnosis/model/weight_term.h"
 
 namespace backlash::changes {
 namespace {
@@ -16,10 +16,7 @@ constexpr double kLeastFrictionOrder = 1;            // 1/rad, of position-depen
 constexpr double kMostOrder = 80, kOrderStep = 0.5;  // 1/rad. Choice
 constexpr double kMostFrictionOrder = 12;            // 1/rad. Choice
 constexpr double kFluctuationSpeeds[] = {0.4, 0.7, 1, 1.4, 1.8, 2.3};  // - of the rms speed. Choice
-constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};                  // - of the rms speed. Choice
-
-// Ways over which dry friction builds up after a reversal: shorter ones are over before anything counts.
-constexpr double kBristles[] = {0.02, 0.05, 0.12};  // s, times the rms speed. Choice
+const char* const kSlip = "encoder_slip";
 
 double direction(const Moment& m, double) {
   return m.direction;
@@ -30,26 +27,6 @@ double speed(const Moment& m, double) {
 double acceleration(const Moment& m, double) {
   return m.acceleration;
 }
-double one(const Moment&, double) {
-  return 1;
-}
-double speed_size(const Moment& m, double) {
-  return std::fabs(m.speed);
-}
-double cosine(const Moment& m, double) {
-  return std::cos(m.position);
-}
-double sine(const Moment& m, double) {
-  return std::sin(m.position);
-}
-double load_rub(const Moment& m, double) {
-  return m.direction * std::fabs(m.load);
-}
-/// The mean of a load that fluctuates from the speed w0 on, as the term has it.
-double fluctuating_load_rub(const Moment& m, double w0) {
-  const double t = std::fabs(m.load), a = m.fluctuation * std::max(0.0, std::fabs(m.speed) - w0);
-  return m.direction * (t >= a ? t : (t * t + a * a) / (2 * a));
-}
 /// A joint stands s less than its encoder shows, per s: only gravity shows that.
 double load_elsewhere(const Moment& m, double s) {
   return s == 0 ? -m.load_slope : ((std::cos(s) - 1) * m.weight - std::sin(s) * m.load_slope) / s;
@@ -58,188 +35,232 @@ double load_elsewhere(const Moment& m, double s) {
 double whole_torque(const Moment& m, double) {
   return m.torque;
 }
-double drag(const Moment& m, double) {
-  return m.speed * std::fabs(m.speed);
-}
-double stribeck(const Moment& m, double ws) {
-  return m.direction * std::exp(-m.speed * m.speed / (ws * ws));
-}
-/// What Dahl's law lacks of dry friction after a reversal.
-double late_friction(const Moment& m, double distance) {
-  return -2 * m.direction * std::exp(-m.way / distance);
-}
-double drift(const Moment& m, double) {
-  return m.direction * m.time;
-}
-
-double half_side(const Moment& m, double) {
-  return 0.5 * m.side();
-}
-double half_side_drift(const Moment& m, double) {
-  return 0.5 * m.side() * m.time;
-}
 double mesh_load(const Moment& m, double) {
   return m.mesh;
-}
-/// A load encoder that shows more makes the deflection smaller; so does a transmission that runs ahead.
-double less_position(const Moment& m, double) {
-  return -m.position;
 }
 double less_one(const Moment&, double) {
   return -1;
 }
+
+/// Values that every rig file declares, and sensors. What they are measured by may have another name.
 struct Declared {
   const char *name, *unit, *value;
+  double (*column)(const Moment&, double shape);
+  bool of_load = false;
 };
-constexpr Declared kDeclared[] = {{"motor_coulomb", "N m", "motor_coulomb"},
-                                  {"motor_viscous", "N m s/rad", "motor_viscous"},
-                                  {"motor_inertia", "kg m^2", "motor_inertia"},
-                                  {"load_inertia", "kg m^2", "load_inertia"},
-                                  {"mesh_stiffness", "rad/(N m)", "compliance"},
-                                  {"encoder_skew", "s", "encoder_skew"},
-                                  {"encoder_slip", "rad", "offset"},
-                                  {"motor_torque_gain", "-", "gain"},
-                                  {"presliding", "N m", "torque"}};
+const Declared kOfTorque[] = {{"motor_coulomb", "N m", "motor_coulomb", direction},
+                              {"motor_viscous", "N m s/rad", "motor_viscous", speed},
+                              {"motor_inertia", "kg m^2", "motor_inertia", acceleration},
+                              {"load_inertia", "kg m^2", "load_inertia", acceleration},
+                              {"motor_torque_gain", "-", "gain", whole_torque, true},
+                              {kSlip, "rad", "offset", load_elsewhere, true}};
+const Declared kOfDeflection[] = {{"mesh_stiffness", "rad/(N m)", "compliance", mesh_load},
+                                  {kSlip, "rad", "offset", less_one},
+                                  {"encoder_skew", "s", "encoder_skew", speed}};
 
-std::string unit_of(const std::string& id, const std::string& parameter) {
-  for (const Declared& d : kDeclared)
-    if (id == d.name) return d.unit;
-  for (const ParameterSpec& spec : model::term_type(id).parameters)
-    if (spec.name == parameter) return spec.unit;
-  return "";
-}
-
-/// Name of the value of an effect with one column.
-std::string value_name(const std::string& id) {
-  for (const Declared& d : kDeclared)
-    if (id == d.name) return d.value;
-  return model::term_type(id).search->strength;
-}
-
-ChangeEffect wave(const std::string& id, double order, const Wave& wave) {
-  ChangeEffect e = {id, order, {}};
-  for (const bool is_sine : {false, true})
-    e.columns.emplace_back([wave, is_sine](const Moment& m, double n) {
-      return wave.factor(m) * (is_sine ? std::sin(n * m.position) : std::cos(n * m.position));
-    });
-  e.wave = wave;
+ChangeEffect effect_of(const Declared& d) {
+  ChangeEffect e{d.name};
+  e.law = [column = d.column](double shape) {
+    return std::vector<OfMoment>{[=](const Moment& m) { return column(m, shape); }};
+  };
+  e.count = 1;
+  e.of_load = d.of_load;
   return e;
 }
 
-/// Of the deflection: motor ahead of load.
-std::vector<ChangeEffect> deflection_effects() {
-  std::vector<ChangeEffect> all = {
-      {"backlash", 0, {half_side}},          {"mesh_stiffness", 0, {mesh_load}},
-      {"encoder_slip", 0, {less_one}},       {"encoder_skew", 0, {speed}},
-      {"encoder_scale", 0, {less_position}}, {"backlash", 0, {half_side, half_side_drift}, true}};
-  for (double n = kLeastOrder; n <= kMostOrder; n += kOrderStep)
-    all.push_back(wave("transmission_error", n, {-1, false}));
+const Declared* declared(const std::string& id) {
+  for (const Declared& d : kOfTorque)
+    if (id == d.name) return &d;
+  for (const Declared& d : kOfDeflection)
+    if (id == d.name) return &d;
+  return nullptr;
+}
+
+model::JointMoment joint_moment(const Moment& m) {
+  return {m.time, m.position, m.speed, m.direction, m.load, m.way, m.side()};
+}
+
+std::vector<OfMoment> columns_of(model::TermColumns term) {
+  const auto shared = std::make_shared<const model::TermColumns>(std::move(term));
+  std::vector<OfMoment> all;
+  for (std::size_t i = 0; i < shared->count(); ++i)
+    all.emplace_back([shared, i](const Moment& m) { return shared->at(i, joint_moment(m)); });
   return all;
+}
+
+/// With each value of its shape; of waves all orders.
+std::vector<ChangeEffect> effects_of(const model::SearchedTerm& term) {
+  const model::TermType& type = *term.type;
+  const std::optional<ParameterSpec> shape = model::searched_shape(type);
+  const auto made = [type = &type, given = term.given, shape](double value) {
+    ParameterValues all = given;
+    if (shape) all[shape->name] = value;
+    return model::TermColumns(*type, all);
+  };
+  const model::TermColumns any = made(1);
+  ChangeEffect e{type.id};
+  e.law = [made](double value) { return columns_of(made(value)); };
+  e.count = any.count();
+  e.type = &type;
+  e.of_load = any.follows_load();
+  e.rubs = any.rubs();
+  for (const model::TermShape& s : type.search->shapes)
+    if (!s.refined) e.variant += " " + s.name + " " + to_text(term.given.at(s.name));
+  if (!shape) return {e};
+  std::vector<double> values = term.shapes;
+  if (model::has_order(type))
+    for (double n = e.least_order(); n <= (e.rubs ? kMostFrictionOrder : kMostOrder); n += kOrderStep)
+      values.push_back(n);
+  std::vector<ChangeEffect> all(values.size(), e);
+  for (std::size_t i = 0; i < values.size(); ++i) all[i].shape = values[i];
+  return all;
+}
+
+/// Torque of the load that fluctuates from the speed w0 on, faster than the record shows, by as much per
+/// speed as each moment says: the law of the term is homogeneous in torques.
+std::optional<ChangeEffect> fluctuating(const ChangeEffect& effect, double w0) {
+  if (!effect.of_load || !effect.rubs) return std::nullopt;
+  const auto term = std::make_shared<const model::TermColumns>(
+      *effect.type, ParameterValues{{"fluctuation", 1}, {"fluctuation_speed", w0}});
+  ChangeEffect e = effect;
+  e.shape = w0;
+  e.law = [term](double) {
+    return std::vector<OfMoment>{[term](const Moment& m) {
+      model::JointMoment scaled = joint_moment(m);
+      if (m.fluctuation > 0) scaled.load /= m.fluctuation;
+      return m.fluctuation > 0 ? m.fluctuation * term->at(0, scaled) : m.direction * std::fabs(m.load);
+    }};
+  };
+  return e;
+}
+
+/// What grows linearly from the onset on, as another effect is called that does so.
+ChangeEffect ramp_of(const ChangeEffect& effect, const ChangeEffect& called) {
+  ChangeEffect e = effect;
+  e.id = called.id;
+  e.type = called.type;
+  e.law = [law = effect.law](double shape) {
+    std::vector<OfMoment> both = law(shape);
+    both.emplace_back([first = both.front()](const Moment& m) { return first(m) * m.time; });
+    return both;
+  };
+  e.count = 2;
+  e.ramp = true;
+  return e;
+}
+
+/// Whether its law has the time: a record that changes shows it as a ramp.
+bool follows_time(const ChangeEffect& effect) {
+  Moment early{}, late{};
+  early.speed = late.speed = early.direction = late.direction = late.time = 1;
+  const OfMoment column = effect.columns().front();
+  return column(early) != column(late);
 }
 
 }  // namespace
 
-bool ChangeEffect::of_load() const {
-  return id == "load_dependent_friction" || id == "encoder_slip" || id == "motor_torque_gain";
-}
-
-bool ChangeEffect::rubs() const {
-  return id == "load_dependent_friction" || id == "position_dependent_friction" || id == "stribeck" ||
-         id == "presliding";
-}
-
 bool ChangeEffect::is_slip() const {
-  return id == "encoder_slip" && !columns.empty();
-}
-
-bool ChangeEffect::has_order() const {
-  return id == "cogging" || id == "position_dependent_friction" || id == "transmission_error";
+  return law && id == kSlip;
 }
 
 bool ChangeEffect::has_scale() const {
-  return id == "stribeck" || id == "presliding";
-}
-
-std::pair<const char*, const char*> ChangeEffect::scale() const {
-  return id == "stribeck" ? std::pair("speed", "rad/s") : std::pair("distance", "rad");
+  return type && shape > 0 && !has_order() && !of_load;
 }
 
 bool may_be_external_torque(const std::string& effect) {
-  return effect == "asymmetric_coulomb";
+  for (const model::TermType& type : model::term_types())
+    if (type.id == effect && type.search && type.search->shapes.empty() && type.search->phase.empty() &&
+        model::shown_in(type) == model::ShownIn::torque) {
+      const model::TermColumns term(type, {});
+      const double forward = term.at(0, {0, 1, 1, 1, 1}), backward = term.at(0, {0, 2, -2, -1, -2});
+      return forward == backward;  // the same whatever the joint does
+    }
+  return false;
 }
 
 double ChangeEffect::least_order() const {
-  return id == "position_dependent_friction" ? kLeastFrictionOrder : kLeastOrder;
+  return rubs ? kLeastFrictionOrder : kLeastOrder;
 }
 
 Eigen::Index ChangeEffect::freedom() const {
-  return static_cast<Eigen::Index>(ramp ? 1 : columns.size()) + (at_place()                   ? 2
-                                                                 : has_order() || has_scale() ? 1
-                                                                                              : 0);
+  return static_cast<Eigen::Index>(ramp ? 1 : count) + (at_place() ? 2 : has_order() || has_scale() ? 1 : 0);
 }
 
 std::string ChangeEffect::name() const {
   if (at_place()) return id + " at " + to_text(shape);
-  return shape > 0 && !is_slip() ? id + " " + to_text(shape) : id;
+  return shape > 0 && !is_slip() ? id + " " + to_text(shape) + variant : id;
 }
 
 std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
-  if (sampling.channel == ChangeChannel::deflection) return deflection_effects();
-  // What is carried or dropped moves with the load.
-  std::vector<ChangeEffect> all = {{"motor_coulomb", 0, {direction}},
-                                   {"motor_viscous", 0, {speed}},
-                                   {sampling.mesh ? "load_inertia" : "motor_inertia", 0, {acceleration}},
-                                   {"asymmetric_coulomb", 0, {one}},
-                                   {"load_dependent_friction", 0, {load_rub}},
-                                   {"asymmetric_viscous", 0, {speed_size}},
-                                   {"quadratic_drag", 0, {drag}},
-                                   {"friction_drift", 0, {direction, drift}, true}};
-  // Of an arm those are effects of the chain.
-  if (!sampling.chain) {
-    all.push_back({"gravity", 1, {cosine, sine}});
-    all.push_back(*with_inertia(all.back()));
-    all.push_back({"motor_torque_gain", 0, {whole_torque}});
+  const bool torque = sampling.channel == ChangeChannel::torque;
+  std::vector<ChangeEffect> all;
+  const auto add_declared = [&](const char* name) { all.push_back(effect_of(*declared(name))); };
+  if (torque) {
+    add_declared("motor_coulomb");
+    add_declared("motor_viscous");
+    // What is carried or dropped moves with the load.
+    add_declared(sampling.mesh ? "load_inertia" : "motor_inertia");
+    if (!sampling.chain) add_declared("motor_torque_gain");
+    if (!sampling.mesh && !sampling.chain) add_declared(kSlip);
+  } else {
+    for (const Declared& d : kOfDeflection) all.push_back(effect_of(d));
   }
-  if (!sampling.mesh && !sampling.chain) all.push_back({"encoder_slip", 0, {load_elsewhere}});
-  for (const double share : kFluctuationSpeeds)
-    all.push_back({"load_dependent_friction", share * sampling.speed, {fluctuating_load_rub}});
-  for (const double share : kStribeckSpeeds) all.push_back({"stribeck", share * sampling.speed, {stribeck}});
-  for (const double way : kBristles) all.push_back({"presliding", way * sampling.speed, {late_friction}});
-  for (double n = kLeastFrictionOrder; n <= kMostFrictionOrder; n += kOrderStep)
-    all.push_back(wave("position_dependent_friction", n, {1, true}));
-  for (double n = kLeastOrder; n <= kMostOrder; n += kOrderStep)
-    all.push_back(wave("cogging", n, {1, false}));
+  model::MotionRange range;
+  range.torque = range.duration = 1, range.speed = sampling.speed;
+  for (const model::SearchedTerm& term :
+       model::searched_terms(torque ? model::ShownIn::torque : model::ShownIn::deflection, range)) {
+    const bool weight = term.type->id == model::weight_term();
+    if (weight && sampling.chain) continue;  // an effect of the chain
+    const std::vector<ChangeEffect> effects = effects_of(term);
+    if (follows_time(effects.front())) {
+      all.push_back(ramp_of(all.front(), effects.front()));
+      continue;
+    }
+    all.insert(all.end(), effects.begin(), effects.end());
+    if (weight) all.push_back(*with_inertia(all.back()));
+    if (effects.front().id == "backlash") all.push_back(ramp_of(effects.front(), effects.front()));
+    for (const double share : kFluctuationSpeeds)
+      if (const auto e = fluctuating(effects.front(), share * sampling.speed)) all.push_back(*e);
+  }
   return all;
 }
 
 std::optional<ChangeEffect> with_inertia(const ChangeEffect& effect) {
-  if (effect.id != "gravity" || effect.columns.size() != 2) return std::nullopt;
+  if (!effect.type || effect.type->id != model::weight_term() || effect.count != 2) return std::nullopt;
   ChangeEffect e = effect;
-  e.columns.emplace_back(acceleration);
+  e.law = [law = effect.law](double shape) {
+    std::vector<OfMoment> columns = law(shape);
+    columns.emplace_back([](const Moment& m) { return m.acceleration; });
+    return columns;
+  };
+  e.count = 3;
   return e;
 }
 
 std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::VectorXd& values,
                                     const Eigen::MatrixXd& covariance, bool linear) {
   std::vector<ChangeSize> out;
-  const auto add = [&](const std::string& name, double value, double error) {
-    out.push_back({name, model::axis_unit(unit_of(effect.id, name), linear), {value, error}});
+  const auto add = [&](const std::string& name, const std::string& unit, double value, double error) {
+    out.push_back({name, model::axis_unit(unit, linear), {value, error}});
   };
+  if (const Declared* d = effect.type ? nullptr : declared(effect.id)) {
+    add(d->value, d->unit, values[0], std::sqrt(covariance(0, 0)));
+    return out;
+  }
+  const ParameterSpec strength = model::regressed_strength(*effect.type);
   if (values.size() == 1) {
-    add(value_name(effect.id), values[0], std::sqrt(covariance(0, 0)));
-    if (effect.id == "load_dependent_friction" && effect.shape > 0)
-      add("fluctuation_speed", effect.shape, effect.shape);
+    add(strength.name, strength.unit, values[0], std::sqrt(covariance(0, 0)));
+    if (effect.of_load && effect.shape > 0) add("fluctuation_speed", "rad/s", effect.shape, effect.shape);
     return out;
   }
   // c cos x + s sin x = A sin(x + p)
   const double amplitude = std::hypot(values[0], values[1]);
   const Eigen::Matrix2d of_wave = covariance.topLeftCorner<2, 2>();
   const Eigen::Vector2d along = values.head<2>() / amplitude, across(along[1], -along[0]);
-  add("amplitude", amplitude, std::sqrt(along.dot(of_wave * along)));
-  add("phase", std::atan2(values[0], values[1]), std::sqrt(across.dot(of_wave * across)) / amplitude);
-  if (values.size() == 3)
-    out.push_back({"inertia", model::axis_unit("kg m^2", linear), {values[2], std::sqrt(covariance(2, 2))}});
-  if (effect.has_order()) add("order", effect.shape, 0);
+  add(strength.name, strength.unit, amplitude, std::sqrt(along.dot(of_wave * along)));
+  add("phase", "rad", std::atan2(values[0], values[1]), std::sqrt(across.dot(of_wave * across)) / amplitude);
+  if (values.size() == 3) add("inertia", "kg m^2", values[2], std::sqrt(covariance(2, 2)));
+  if (effect.has_order()) add("order", "1/rad", effect.shape, 0);
   return out;
 }
 

@@ -7,44 +7,38 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/changes/changes.h"
+#include "backlash_diagnosis/model/term_columns.h"
 #include "sampled_motion.h"
 
 namespace backlash::changes {
 
-/// factor * cos(shape * position), factor * sin(shape * position)
-struct Wave {
-  double sign = 1;
-  bool rubbed = false;  // against the motion
-
-  double factor(const Moment& m) const { return rubbed ? sign * m.direction : sign; }
-};
-
 struct ChangeEffect {
-  std::string id;    // of the registry of terms, or the name of a declared value
+  std::string id;    // of the dictionary of terms, or the name of a declared value
   double shape = 0;  // order [1/rad], speed [rad/s], place or slip [rad], where the effect has one
-  /// Columns of one moment. Two: cosine and sine of a wave; of a ramp something and that times time.
-  std::vector<std::function<double(const Moment&, double shape)>> columns;
-  bool ramp = false;         // the second column grows from the onset on
-  double width = 0;          // rad, of what is at a place; 0: it is not
-  std::optional<Wave> wave;  // of those whose columns are waves along the position
+  /// Columns of one moment, with such a shape. Two: cosine and sine of a wave; of a ramp something and that
+  /// times time. Null: they are given (chain_motion.h).
+  std::function<std::vector<OfMoment>(double shape)> law = nullptr;
+  std::size_t count = 0;                  // columns
+  bool ramp = false;                      // the second column grows from the onset on
+  double width = 0;                       // rad, of what is at a place; 0: it is not
+  const model::TermType* type = nullptr;  // of the dictionary; null: no term's effect
+  bool of_load = false;                   // its columns need what the healthy machine is taken to bear
+  bool rubs = false;                      // a part of friction, the same in both directions
+  std::string variant = "";               // which law of several of one term
 
+  std::vector<OfMoment> columns() const { return law(shape); }
   bool at_place() const { return width > 0; }
   /// Values that are fitted, order, place and width among them.
   Eigen::Index freedom() const;
-
-  bool of_load() const;  // whether its columns need what the healthy machine is taken to bear
-  bool rubs() const;     // whether it is a part of friction
   bool is_slip()
       const;  // of a joint by itself: `shape` is the slip [rad] whose size the columns are right for
-  bool has_order() const;
-  bool has_scale() const;                             // `shape` is a speed or a way that is fitted by factors
-  std::pair<const char*, const char*> scale() const;  // name and unit of that
-  double least_order() const;                         // that is tried, of one that has one
-  std::string name() const;                           // with its shape
+  bool has_order() const { return type && model::has_order(*type); }
+  bool has_scale() const;      // `shape` is a speed or a way that is fitted by factors
+  double least_order() const;  // that is tried, of one that has one
+  std::string name() const;    // with its shape
 };
 
 /// Whether somebody who leans on a moving machine looks like this effect.

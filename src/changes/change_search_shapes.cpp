@@ -110,9 +110,9 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
   covariance(0, 0) += std::pow(settings_.model_error * f.score.values[0], 2);
   std::vector<ChangeSize> size =
       change_size(f.effect, f.score.values, covariance.topLeftCorner<1, 1>(), linear);
-  const auto [name, unit] = f.effect.scale();
-  size.push_back({name,
-                  model::axis_unit(unit, linear),
+  const ParameterSpec scale = *model::searched_shape(*f.effect.type);
+  size.push_back({scale.name,
+                  model::axis_unit(scale.unit, linear),
                   {f.effect.shape, f.effect.shape * std::min(1.0, std::sqrt(covariance(1, 1)))}});
   return size;
 }

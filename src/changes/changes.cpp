@@ -24,14 +24,16 @@ struct ChannelChanges {
 /// gap.
 std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& changes, double block) {
   if (changes.empty()) return {};
-  return [changes, block](const Moment& m) {
+  std::vector<std::vector<OfMoment>> columns;
+  for (const FoundChange& f : changes) columns.push_back(f.effect.columns());
+  return [changes, columns, block](const Moment& m) {
     double sum = 0;
-    for (const FoundChange& f : changes) {
+    for (std::size_t n = 0; n < changes.size(); ++n) {
+      const FoundChange& f = changes[n];
       if (m.time < block * double(f.from) || m.time >= block * double(f.to)) continue;
-      if (f.effect.ramp)
-        sum += f.score.values[0] * f.effect.columns[0](m, f.effect.shape) * (m.time - block * double(f.from));
-      for (std::size_t i = 0; !f.effect.ramp && i < f.effect.columns.size(); ++i)
-        sum += f.score.values[static_cast<Eigen::Index>(i)] * f.effect.columns[i](m, f.effect.shape);
+      if (f.effect.ramp) sum += f.score.values[0] * columns[n][0](m) * (m.time - block * double(f.from));
+      for (std::size_t i = 0; !f.effect.ramp && i < columns[n].size(); ++i)
+        sum += f.score.values[static_cast<Eigen::Index>(i)] * columns[n][i](m);
     }
     return sum;
   };
@@ -101,7 +103,7 @@ void name_sides(const ChannelChanges& torque, const ChannelChanges* deflection, 
   std::size_t column = 0;
   for (const FoundChange& f : torque.found) {
     const std::size_t at = column;
-    column += f.effect.ramp ? 1 : f.effect.columns.size();
+    column += f.effect.ramp ? 1 : f.effect.count;
     for (const auto& [before, behind] : kSides)
       for (Change& c : all.changes) {
         if (f.effect.id != before || c.effect != before || c.size.empty() || c.gain != f.gain) continue;

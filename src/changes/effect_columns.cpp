@@ -13,12 +13,12 @@ constexpr Eigen::Index kTogether = 8;  // as many as low_pass_columns() takes at
 
 bool is_kept(const ChangeEffect& effect) {
   // Columns of the load depend on the assumed machine; columns of a place are needed once only.
-  return !effect.of_load() && !effect.at_place();
+  return !effect.of_load && !effect.at_place();
 }
 
 std::string key_of(const ChangeEffect& effect) {
   // Those of a chain are given.
-  return effect.columns.empty() ? effect.name() : effect.name() + " " + std::to_string(effect.columns.size());
+  return effect.law ? effect.name() + " " + std::to_string(effect.count) : effect.name();
 }
 
 bool has_room(const SampledMotion& motion) {
@@ -39,8 +39,8 @@ class Turning {
     go_to(wave.shape);
     columns.col(0) = cosine_;
     columns.col(1) = sine_;
-    for (Eigen::Index k = 0; k < columns.rows(); ++k)
-      columns.row(k) *= wave.wave->factor(motion_.moments[static_cast<std::size_t>(k)]);
+    if (factor_of_ != wave.type) find_factor(wave);
+    for (Eigen::Index k = 0; k < columns.rows(); ++k) columns.row(k) *= factor_[k];
   }
 
  private:
@@ -62,16 +62,32 @@ class Turning {
     order_ = order;
   }
 
+  /// The wave of a moment is that times cos(n q), and sin(n q): its cosine at the position 0.
+  void find_factor(const ChangeEffect& wave) {
+    factor_of_ = wave.type;
+    factor_.resize(positions_.size());
+    const OfMoment cosine = wave.columns().front();
+    for (Eigen::Index k = 0; k < factor_.size(); ++k) {
+      Moment m = motion_.moments[static_cast<std::size_t>(k)];
+      m.position = 0;
+      factor_[k] = cosine(m);
+    }
+  }
+
   const SampledMotion& motion_;
+  const model::TermType* factor_of_ = nullptr;
+  Eigen::ArrayXd factor_;
   double order_ = 0, step_ = 0;
   Eigen::ArrayXd positions_, cosine_, sine_, cosine_of_step_, sine_of_step_;
 };
 
 void put(const SampledMotion& motion, const ChangeEffect& effect, Eigen::Ref<Eigen::MatrixXd> columns) {
-  for (std::size_t i = 0; i < effect.columns.size(); ++i)
+  Eigen::Index i = 0;
+  for (const OfMoment& f : effect.columns()) {
     for (Eigen::Index k = 0; k < columns.rows(); ++k)
-      columns(k, static_cast<Eigen::Index>(i)) =
-          effect.columns[i](motion.moments[static_cast<std::size_t>(k)], effect.shape);
+      columns(k, i) = f(motion.moments[static_cast<std::size_t>(k)]);
+    ++i;
+  }
 }
 
 }  // namespace
@@ -80,11 +96,11 @@ std::shared_ptr<const Eigen::MatrixXd> effect_columns(const SampledMotion& motio
                                                       const ChangeEffect& effect) {
   const std::string key = key_of(effect);
   const bool kept = is_kept(effect);
-  if (effect.columns.empty()) return motion.known_columns.at(key);
+  if (!effect.law) return motion.known_columns.at(key);
   if (kept)
     if (const auto known = motion.known_columns.find(key); known != motion.known_columns.end())
       return known->second;
-  Eigen::MatrixXd all(motion.moments.size(), effect.columns.size());
+  Eigen::MatrixXd all(motion.moments.size(), effect.count);
   put(motion, effect, all);
   auto columns = std::make_shared<const Eigen::MatrixXd>(filtered(motion, std::move(all)));
   if (kept && has_room(motion)) motion.known_columns.emplace(key, columns);
@@ -101,7 +117,7 @@ void prepare_columns(const SampledMotion& motion, const std::vector<ChangeEffect
     const Eigen::MatrixXd rows = filtered(motion, all);
     Eigen::Index at = 0;
     for (const ChangeEffect* e : together) {
-      const auto count = static_cast<Eigen::Index>(e->columns.size());
+      const auto count = static_cast<Eigen::Index>(e->count);
       motion.known_columns.emplace(key_of(*e),
                                    std::make_shared<const Eigen::MatrixXd>(rows.middleCols(at, count)));
       at += count;
@@ -110,11 +126,11 @@ void prepare_columns(const SampledMotion& motion, const std::vector<ChangeEffect
     used = 0;
   };
   for (const ChangeEffect& e : effects) {
-    const auto count = static_cast<Eigen::Index>(e.columns.size());
+    const auto count = static_cast<Eigen::Index>(e.count);
     if (!is_kept(e) || count == 0 || motion.known_columns.count(key_of(e)) > 0) continue;
     if (!has_room(motion)) break;
     if (used + count > kTogether) finish();
-    if (e.wave)
+    if (e.has_order())
       turning.put(e, all.middleCols(used, count));
     else
       put(motion, e, all.middleCols(used, count));

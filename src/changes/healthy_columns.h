@@ -15,8 +15,6 @@ enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kJerk, kCommo
 enum TorqueBase { kWarmViscous = kCommonColumns, kWarmCoulomb };
 enum DeflectionBase { kHalfGap = kCommonColumns, kScale };
 
-using OfMoment = std::function<double(const Moment&)>;
-
 /// Those that last, in the order of Base.
 std::vector<OfMoment> lasting(const MotionSampling& sampling);
 

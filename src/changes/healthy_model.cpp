@@ -81,7 +81,7 @@ void set_torques(const HealthyModel& model, SampledMotion& motion) {
   std::vector<OfMoment> all = lasting(motion.sampling);
   for (OfMoment& f : warming(motion.sampling, model.warm_up)) all.push_back(std::move(f));
   for (const ChangeEffect& e : model.further)
-    for (const auto& f : e.columns) all.emplace_back([&](const Moment& m) { return f(m, e.shape); });
+    for (OfMoment& f : e.columns()) all.push_back(std::move(f));
   for (Moment& m : motion.moments) {
     m.torque = m.chain;
     for (std::size_t i = 0; i < all.size(); ++i)

@@ -49,10 +49,9 @@ OfMoment dry_friction(const HealthyModel& model) {
   std::vector<std::pair<double, OfMoment>> parts;
   Eigen::Index i = kWarmCoulomb + 1;
   for (const ChangeEffect& e : model.further)
-    for (const auto& f : e.columns) {
-      const double share = model.values[i++] / model.values[kCoulomb], shape = e.shape;
-      if (e.rubs() && std::fabs(share) < kMostBeside)
-        parts.emplace_back(share, [f, shape](const Moment& m) { return f(m, shape); });
+    for (const OfMoment& f : e.columns()) {
+      const double share = model.values[i++] / model.values[kCoulomb];
+      if (e.rubs && std::fabs(share) < kMostBeside) parts.emplace_back(share, f);
     }
   return [parts](const Moment& m) {
     double sum = m.direction;
@@ -91,10 +90,9 @@ void add_warm_rest(const HealthyModel& model, Nuisances& out) {
           kOtherWarmUp * std::fabs(model.values[kWarmViscous]));
   Eigen::Index i = kWarmCoulomb + 1;
   for (const ChangeEffect& e : model.further)
-    for (const auto& f : e.columns) {
-      const double spread = std::min(share, 1.0) * std::fabs(model.values[i++]), shape = e.shape;
-      if (e.rubs())
-        out.add([=](const Moment& m) { return f(m, shape) * std::exp(-m.time / warm_up); }, spread);
+    for (const OfMoment& f : e.columns()) {
+      const double spread = std::min(share, 1.0) * std::fabs(model.values[i++]);
+      if (e.rubs) out.add([=](const Moment& m) { return f(m) * std::exp(-m.time / warm_up); }, spread);
     }
 }
 

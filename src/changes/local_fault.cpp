@@ -38,10 +38,14 @@ double bump(double position, double place, double width) {
 const char* const kLocalFault = "local_fault";
 
 ChangeEffect local_fault(ChangeChannel channel, double place, double width) {
-  ChangeEffect e{kLocalFault, place, {}, false, width};
-  e.columns = {
-      [=](const Moment& m, double q0) { return forward(channel, m) * bump(m.position, q0, width); },
-      [=](const Moment& m, double q0) { return backward(channel, m) * bump(m.position, q0, width); }};
+  ChangeEffect e{kLocalFault, place};
+  e.count = 2;
+  e.width = width;
+  e.law = [=](double q0) {
+    return std::vector<OfMoment>{
+        [=](const Moment& m) { return forward(channel, m) * bump(m.position, q0, width); },
+        [=](const Moment& m) { return backward(channel, m) * bump(m.position, q0, width); }};
+  };
   return e;
 }
 
@@ -50,14 +54,19 @@ ChangeEffect fault_with_slopes(ChangeChannel channel, const ChangeEffect& fault,
   ChangeEffect e = fault;
   const double width = fault.width, f = values[0], b = values[1];
   const auto size = [=](const Moment& m) { return f * forward(channel, m) + b * backward(channel, m); };
-  e.columns.emplace_back([=](const Moment& m, double q0) {
-    const double c = chord(m.position, q0);
-    return size(m) * bump(m.position, q0, width) * c * std::cos(0.5 * (m.position - q0)) / (width * width);
-  });
-  e.columns.emplace_back([=](const Moment& m, double q0) {
-    const double c = chord(m.position, q0);
-    return size(m) * bump(m.position, q0, width) * c * c / (width * width * width);
-  });
+  e.count = 4;
+  e.law = [=, law = fault.law](double q0) {
+    std::vector<OfMoment> all = law(q0);
+    all.emplace_back([=](const Moment& m) {
+      const double c = chord(m.position, q0);
+      return size(m) * bump(m.position, q0, width) * c * std::cos(0.5 * (m.position - q0)) / (width * width);
+    });
+    all.emplace_back([=](const Moment& m) {
+      const double c = chord(m.position, q0);
+      return size(m) * bump(m.position, q0, width) * c * c / (width * width * width);
+    });
+    return all;
+  };
   return e;
 }
 

@@ -64,6 +64,8 @@ struct Moment {
   double side() const { return mesh < 0 ? -1 : 1; }  // flank that bears it
 };
 
+using OfMoment = std::function<double(const Moment&)>;
+
 struct SampledMotion {
   MotionSampling sampling;
   double start = 0;  // s, the record's first stamp

@@ -6,35 +6,50 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/model/register_term.h"
 #include "terms/terms.h"
 
 namespace backlash::model {
 
-const std::vector<TermType>& term_types() {
-  static const std::vector<TermType> types = {asymmetric_coulomb_term(),
-                                              asymmetric_viscous_term(),
-                                              backlash_term(),
-                                              backlash_map_term(),
-                                              cogging_term(),
-                                              delay_term(),
-                                              eccentricity_term(),
-                                              encoder_scale_term(),
-                                              friction_drift_term(),
-                                              gravity_term(),
-                                              learned_map_term(),
-                                              load_dependent_friction_term(),
-                                              local_fault_term(),
-                                              mesh_hardening_term(),
-                                              position_dependent_friction_term(),
-                                              presliding_term(),
-                                              quadratic_drag_term(),
-                                              square_root_friction_term(),
-                                              radial_compliance_term(),
-                                              stribeck_term(),
-                                              transmission_error_term(),
-                                              varying_backlash_term(),
-                                              varying_reduction_ratio_term()};
+namespace {
+
+std::vector<TermType>& registry() {
+  static std::vector<TermType> types = {asymmetric_coulomb_term(),
+                                        asymmetric_viscous_term(),
+                                        backlash_term(),
+                                        backlash_map_term(),
+                                        cogging_term(),
+                                        delay_term(),
+                                        eccentricity_term(),
+                                        encoder_scale_term(),
+                                        friction_drift_term(),
+                                        gravity_term(),
+                                        learned_map_term(),
+                                        load_dependent_friction_term(),
+                                        local_fault_term(),
+                                        mesh_hardening_term(),
+                                        position_dependent_friction_term(),
+                                        presliding_term(),
+                                        quadratic_drag_term(),
+                                        square_root_friction_term(),
+                                        radial_compliance_term(),
+                                        stribeck_term(),
+                                        transmission_error_term(),
+                                        varying_backlash_term(),
+                                        varying_reduction_ratio_term()};
   return types;
+}
+
+}  // namespace
+
+const std::vector<TermType>& term_types() {
+  return registry();
+}
+
+void register_term(TermType type) {
+  for (const TermType& known : registry())
+    if (known.id == type.id) throw InvalidParameter("id", type.id, "is a term already");
+  registry().push_back(std::move(type));
 }
 
 double order_resolution(const MotionRange& range) {

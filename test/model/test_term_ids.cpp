@@ -28,10 +28,9 @@ const std::set<std::pair<std::string, std::string>> kOtherMeanings = {
     {"friction_drift", "src/arm/trace.cpp"},                     // an arm has no terms: the effect of a joint
 };
 
-/// What changes with the time is looked for in columns of a regression, each of which is one term's law; a
-/// term that another simulator's language has is translated by name.
-const std::set<std::string> kOtherDictionaries = {"src/changes/change_effects.cpp",
-                                                  "src/changes/local_fault.cpp", "src/arm/joint_effect.cpp",
+/// A fault of one place has a bump of its own for each direction; a term that another simulator's language
+/// has is translated by name.
+const std::set<std::string> kOtherDictionaries = {"src/changes/local_fault.cpp", "src/arm/joint_effect.cpp",
                                                   "src/report/joint_model.cpp"};
 
 std::string text_of(const fs::path& path) {
