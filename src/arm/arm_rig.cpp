@@ -207,6 +207,33 @@ void read_drives(const YamlReader& yaml, ArmRig& rig) {
 
 }  // namespace
 
+double drive_unit(DriveTerm term, const model::JointMoment& now) {
+  switch (term) {
+    case DriveTerm::rotor_inertia:
+      return 0;
+    case DriveTerm::coulomb:
+      return now.direction;
+    case DriveTerm::viscous:
+      return now.speed;
+    case DriveTerm::quadratic:
+      return now.speed * std::fabs(now.speed);
+    case DriveTerm::cubic:
+      return now.speed * now.speed * now.speed;
+    case DriveTerm::offset:
+      return 1;
+    case DriveTerm::load:
+      return now.direction * std::fabs(now.load);
+  }
+  return 0;
+}
+
+double drive_friction(const JointDrive& drive, const model::JointMoment& now) {
+  double sum = 0;
+  for (std::size_t i = 0; i < kDriveTerms; ++i)
+    if (drive.terms[i] != 0) sum += drive.terms[i] * drive_unit(DriveTerm(i), now);
+  return sum;
+}
+
 std::optional<std::size_t> index_of(const ArmRig& rig, const std::string& joint) {
   for (std::size_t j = 0; j < rig.joints.size(); ++j)
     if (rig.joints[j].name == joint) return j;

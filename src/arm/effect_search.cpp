@@ -14,9 +14,7 @@ namespace {
 constexpr double kLeastOwn = 1e-4;  // - of a column's squares that must not follow from the fit's own; choice
 constexpr double kNone = 1e-9;      // - of a column, of what follows from others; rounding
 constexpr double kNearly = 0.9;     // - of the best's share: not distinguished from it; choice
-constexpr double kSpeeds[] = {0.05, 0.1, 0.2, 0.4, 0.7};  // of the rms speed; choice
-constexpr double kDistances[] = {0.01, 0.03, 0.08, 0.2};  // s, times the rms speed; choice
-constexpr double kMostOrder = 80;                         // 1/rad; choice
+constexpr double kMostOrder = 80;   // 1/rad; choice
 constexpr double kOrdersPerTurn =
     4;  // steps of 2 pi over the travel, by which orders are distinguished; choice
 constexpr double kLeastStep = 0.1;         // 1/rad; choice (time)
@@ -169,30 +167,30 @@ Remainder Search::left_of(std::size_t j) const {
 
 std::vector<JointEffect> Search::effects_of(std::size_t j) const {
   std::vector<JointEffect> all;
-  const auto add = [&](const JointEffectSpec& spec, double shape = 0, const std::string& other = "") {
-    all.push_back({spec.id, shape, other, Eigen::Vector2d::Zero()});
-  };
   const double most =
       std::min(kMostOrder, 2 * M_PI * kFastest * fit_.rig.identification.torque_cutoff / speed_[j]);
-  for (const JointEffectSpec& spec : joint_effect_specs()) switch (spec.shape) {
-      case EffectShape::order:
-        for (double n = spec.least_order; n <= most; n += order_step(j)) add(spec, n);
-        break;
-      case EffectShape::speed:
-        for (const double share : kSpeeds) add(spec, share * speed_[j]);
-        break;
-      case EffectShape::distance:
-        for (const double time : kDistances) add(spec, time * speed_[j]);
-        break;
-      case EffectShape::none:
-        // The fit knows a drive from all records.
-        if (everywhere_ && (stands_for_term(spec, fit_.rig) || spec.id == gain_of_drive().id)) break;
-        if (!is_coupling({spec.id, 0, "", Eigen::Vector2d::Zero()}))
-          add(spec);
-        else
-          for (std::size_t i = 0; i < fit_.rig.joints.size(); ++i)
-            if (i != j) add(spec, 0, fit_.rig.joints[i].name);
-    }
+  for (const JointEffectSpec& spec : joint_effect_specs()) {
+    // The fit knows a drive from all records.
+    if (everywhere_ && (stands_for_term(spec, fit_.rig) || spec.id == gain_of_drive().id)) continue;
+    if (spec.type) continue;
+    if (!is_coupling({spec.id}))
+      all.push_back({spec.id});
+    else
+      for (std::size_t i = 0; i < fit_.rig.joints.size(); ++i)
+        if (i != j) all.push_back({spec.id, 0, fit_.rig.joints[i].name});
+  }
+  model::MotionRange range;
+  range.torque = range.duration = 1, range.speed = speed_[j];
+  for (const model::SearchedTerm& term : model::searched_terms(model::ShownIn::torque, range)) {
+    const JointEffectSpec* spec = known_spec(term.type->id);
+    if (!spec || (everywhere_ && stands_for_term(*spec, fit_.rig))) continue;
+    std::vector<double> shapes = term.shapes;
+    if (spec->shape == EffectShape::order)
+      for (double n = spec->least_order; n <= most; n += order_step(j)) shapes.push_back(n);
+    if (shapes.empty()) shapes.push_back(0);
+    for (const double shape : shapes)
+      all.push_back({spec->id, shape, "", Eigen::Vector2d::Zero(), term.given});
+  }
   return all;
 }
 

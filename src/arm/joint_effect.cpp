@@ -6,71 +6,114 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/arm/arm_rig.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/model/weight_term.h"
 #include "joint_effects.h"
 
 namespace backlash::arm {
 namespace {
 
 constexpr double kLeastGain = -0.9,
-                 kMostGain = 10;  // -: a motor gives 1 / (1 + g) of what is recorded; choice
+                 kMostGain = 10;       // -: a motor gives 1 / (1 + g) of what is recorded; choice
+constexpr double kMostBelieved = 0.3;  // -, of a gain that a machine has; choice
+constexpr double kRounding = 1e-12;    // of torques of some N m
 
-Eigen::Vector2d coulomb(double, const DriveMoment& now) {
-  return {now.sign, 0};
+/// Only how an effect is searched depends on it.
+model::MotionRange any_motion() {
+  model::MotionRange range;
+  range.torque = range.speed = range.duration = 1;
+  return range;
 }
-Eigen::Vector2d viscous(double, const DriveMoment& now) {
-  return {now.v, 0};
+
+// Below are links, which have one wave a turn, and their sums; friction they have none. Choice.
+constexpr double kLeastOrder = 3, kLeastFrictionOrder = 1;  // 1/rad
+
+model::TermColumns columns_of(const model::TermType& type, ParameterValues given, double shape) {
+  if (const auto searched = model::searched_shape(type)) given[searched->name] = shape;
+  return {type, given};
 }
-Eigen::Vector2d load_friction(double, const DriveMoment& now) {
-  return {now.sign * std::fabs(now.load), 0};
+
+/// The drive's term of the same law; empty: none.
+std::string drive_term_of(const model::TermColumns& term) {
+  const model::JointMoment here{1, 0.3, 2, 0.9, 5, 0.1, 1}, there{2, 0.7, -3, -0.8, 7, 0.2, -1};
+  for (std::size_t i = 0; i < kDriveTerms; ++i) {
+    const auto same = [&](const model::JointMoment& now) {
+      return std::fabs(term.at(0, now) - drive_unit(DriveTerm(i), now)) < kRounding;
+    };
+    if (same(here) && same(there)) return kDriveTermSpecs[i].name;
+  }
+  return "";
 }
-Eigen::Vector2d drag(double, const DriveMoment& now) {
-  return {now.v * std::fabs(now.v), 0};
+
+JointEffectSpec spec_of(const model::TermType& type, const model::TermColumns& term) {
+  const ParameterSpec strength = model::regressed_strength(type);
+  JointEffectSpec spec{type.id, strength.name, strength.unit, Eigen::Index(term.count())};
+  spec.type = &type;
+  spec.positive = term.count() == 1 && strength.range.lower >= 0;
+  spec.drive_term = drive_term_of(term);
+  if (const auto shape = model::searched_shape(type)) {
+    spec.shape = model::has_order(type) ? EffectShape::order
+                 : shape->unit == "rad" ? EffectShape::distance
+                                        : EffectShape::speed;
+    spec.shape_name = shape->name, spec.shape_unit = shape->unit;
+    if (model::has_order(type)) spec.least_order = term.rubs() ? kLeastFrictionOrder : kLeastOrder;
+  }
+  return spec;
 }
-Eigen::Vector2d asymmetric(double, const DriveMoment& now) {
-  return {std::fabs(now.v), 0};
+
+/// What all records of an arm show otherwise: weights are of its chain, a constant torque is the drive's
+/// offset, friction of the day is a factor of all of a joint's.
+bool is_of_a_drive(const model::TermType& type, const model::TermColumns& term) {
+  return type.id != model::weight_term() && !term.is_constant() && !term.follows_time();
 }
-Eigen::Vector2d stribeck(double speed, const DriveMoment& now) {
-  const double x = now.v / speed;
-  return {now.sign * std::exp(-x * x), 0};
-}
-Eigen::Vector2d wave(double order, const DriveMoment& now) {
-  return {std::cos(order * now.q), std::sin(order * now.q)};
-}
-Eigen::Vector2d rubbing_wave(double order, const DriveMoment& now) {
-  return now.sign * wave(order, now);
+
+std::vector<JointEffectSpec> all_specs() {
+  JointEffectSpec coulomb{"motor_coulomb", "torque", "N m"}, viscous{"motor_viscous", "damping", "N m s/rad"},
+      gain{"motor_torque_gain", "gain", "-"}, coupling{"transmission_coupling", "ratio", "-"};
+  coulomb.drive_term = kDriveTermSpecs[std::size_t(DriveTerm::coulomb)].name;
+  viscous.drive_term = kDriveTermSpecs[std::size_t(DriveTerm::viscous)].name;
+  gain.most = kMostBelieved, coupling.most = 1;
+  std::vector<JointEffectSpec> all{coulomb, viscous, gain, coupling};
+  for (const model::SearchedTerm& searched : model::searched_terms(model::ShownIn::torque, any_motion())) {
+    if (searched.type->id == all.back().id) continue;  // another variant
+    const model::TermColumns term = columns_of(*searched.type, searched.given, 1);
+    if (is_of_a_drive(*searched.type, term)) all.push_back(spec_of(*searched.type, term));
+  }
+  return all;
 }
 
 }  // namespace
 
 const std::vector<JointEffectSpec>& joint_effect_specs() {
-  constexpr EffectShape kNone = EffectShape::none, kOrder = EffectShape::order;
-  static const std::vector<JointEffectSpec> all = {
-      {"motor_coulomb", 1, "torque", "N m", false, kNone, 0, "coulomb", coulomb},
-      {"motor_viscous", 1, "damping", "N m s/rad", false, kNone, 0, "viscous", viscous},
-      {"load_dependent_friction", 1, "coefficient", "-", true, kNone, 0, "load", load_friction},
-      {"quadratic_drag", 1, "drag", "N m s^2/rad^2", true, kNone, 0, "quadratic", drag},
-      {"asymmetric_viscous", 1, "damping", "N m s/rad", false, kNone, 0, "", asymmetric},
-      {"stribeck", 1, "torque", "N m", true, EffectShape::speed, 0, "", stribeck},
-      {"presliding", 1, "torque", "N m", true, EffectShape::distance},
-      {"motor_torque_gain", 1, "gain", "-", false, kNone, 0, "", nullptr, 0.3},
-      {"transmission_coupling", 1, "ratio", "-", false, kNone, 0, "", nullptr, 1},
-      {"position_dependent_friction", 2, "amplitude", "N m", false, kOrder, 1, "", rubbing_wave},
-      {"cogging", 2, "amplitude", "N m", false, kOrder, 3, "", wave}};
+  static const std::vector<JointEffectSpec> all = all_specs();
   return all;
 }
 
-const char* shape_name(EffectShape shape) {
-  return shape == EffectShape::order ? "order" : shape == EffectShape::speed ? "speed" : "distance";
+EffectLaw::EffectLaw(const JointEffect& effect) {
+  const JointEffectSpec& spec = effect.spec();
+  if (is_of_drives(effect)) throw InvalidParameter("effect", effect.id, "has no column of one joint");
+  if (spec.type)
+    term_ = columns_of(*spec.type, effect.given, effect.shape);
+  else
+    drive_term_ = spec.drive_term;
 }
 
-const char* shape_unit(EffectShape shape) {
-  return shape == EffectShape::order ? "1/rad" : shape == EffectShape::speed ? "rad/s" : "rad";
+Eigen::Vector2d EffectLaw::units(const model::JointMoment& now) const {
+  if (!term_)
+    return {drive_term_ == kDriveTermSpecs[std::size_t(DriveTerm::viscous)].name ? now.speed : now.direction,
+            0};
+  return {term_->at(0, now), term_->count() > 1 ? term_->at(1, now) : 0};
+}
+
+const JointEffectSpec* known_spec(const std::string& id) {
+  for (const JointEffectSpec& spec : joint_effect_specs())
+    if (id == spec.id) return &spec;
+  return nullptr;
 }
 
 const JointEffectSpec& JointEffect::spec() const {
-  for (const JointEffectSpec& spec : joint_effect_specs())
-    if (id == spec.id) return spec;
+  if (const JointEffectSpec* spec = known_spec(id)) return *spec;
   throw InvalidParameter("effect", id, "is none of those of a joint of an arm");
 }
 
@@ -113,7 +156,10 @@ JointEffect read_joint_effect(const YamlReader& yaml) {
     const double phase = yaml.number("phase", Range::any());
     e.values = {strength * std::sin(phase), strength * std::cos(phase)};
   }
-  if (spec.has_shape()) e.shape = yaml.number(shape_name(spec.shape), Range::positive());
+  if (spec.has_shape()) e.shape = yaml.number(spec.shape_name, Range::positive());
+  if (spec.type)
+    for (const ParameterSpec& p : spec.type->parameters)
+      if (p.absent) e.given[p.name] = yaml.number_or(p.name, *p.absent, p.range);
   if (is_coupling(e)) e.other = yaml.text("joint");
   return e;
 }
@@ -127,7 +173,11 @@ std::string joint_effect_text(const JointEffect& effect) {
                         std::atan2(effect.values[0], effect.values[1]));
   else
     text += fmt::format(", {}: {:.8g}", spec.strength, effect.values[0]);
-  if (spec.has_shape()) text += fmt::format(", {}: {:.8g}", shape_name(spec.shape), effect.shape);
+  if (spec.has_shape()) text += fmt::format(", {}: {:.8g}", spec.shape_name, effect.shape);
+  if (spec.type)
+    for (const ParameterSpec& p : spec.type->parameters)
+      if (p.absent && effect.given.has(p.name) && effect.given.at(p.name) != *p.absent)
+        text += fmt::format(", {}: {:.8g}", p.name, effect.given.at(p.name));
   return text + "}";
 }
 
@@ -152,13 +202,12 @@ Eigen::MatrixXd effect_columns(const JointEffect& effect, const ArmMotion& m, st
                                const Eigen::VectorXd& load) {
   const auto j = Eigen::Index(joint);
   const JointEffectSpec& spec = effect.spec();
-  if (spec.shape == EffectShape::distance)
-    return -2 * m.sign.col(j).array() * (-way_since_reversal(m, j) / effect.shape).exp();
-  if (!spec.units) throw InvalidParameter("effect", effect.id, "has no column of one joint");
+  const EffectLaw law(effect);
+  Eigen::ArrayXd way = Eigen::ArrayXd::Zero(m.q.rows());
+  if (spec.shape == EffectShape::distance) way = way_since_reversal(m, j);
   Eigen::MatrixXd out(m.q.rows(), spec.columns);
   for (Eigen::Index k = 0; k < out.rows(); ++k)
-    out.row(k) =
-        spec.units(effect.shape, {m.q(k, j), m.motor_v(k, j), m.sign(k, j), load[k]}).head(spec.columns);
+    out.row(k) = law.units({0, m.q(k, j), m.motor_v(k, j), m.sign(k, j), load[k], way[k]}).head(spec.columns);
   return out;
 }
 

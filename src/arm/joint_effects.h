@@ -11,6 +11,9 @@
 
 namespace backlash::arm {
 
+/// Null: it is none of a joint of an arm.
+const JointEffectSpec* known_spec(const std::string& id);
+
 /// Whether its column is the torque of another joint's drive.
 bool is_coupling(const JointEffect& effect);
 

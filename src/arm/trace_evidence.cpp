@@ -196,8 +196,8 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
     return fmt::format("its {} is {:.2g}: beyond {:.2g} it is something else", e.effect.spec().strength,
                        e.effect.values[0], most);
   if (e.effect.spec().has_shape() && e.effect.shape < e.effect.spec().least_order)
-    return fmt::format("its {} is {:.2g}: what links and gravity do as well",
-                       shape_name(e.effect.spec().shape), e.effect.shape);
+    return fmt::format("its {} is {:.2g}: what links and gravity do as well", e.effect.spec().shape_name,
+                       e.effect.shape);
   if (e.effect.spec().positive && !(e.effect.values[0] > 0))
     return fmt::format("its {} is {:.2g}: no friction is negative", e.effect.spec().strength,
                        e.effect.values[0]);
@@ -208,11 +208,11 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
   const FreeEffect& guess = c.freedom.effects.back();
   if (e.effect.spec().has_shape() && std::fabs(std::log(e.effect.shape / guess.effect.shape)) > kFarFromGuess)
     return fmt::format("its {} is {:.2g} where the residual had {:.2g}: the records do not determine it",
-                       shape_name(e.effect.spec().shape), e.effect.shape, guess.effect.shape);
+                       e.effect.spec().shape_name, e.effect.shape, guess.effect.shape);
   if (const double shape_error = std::sqrt(e.covariance(2, 2));
       e.effect.spec().has_shape() && shape_error > kShapeKnown * e.effect.shape)
     return fmt::format("its {} is {:.2g} +- {:.1g}: the records do not determine it",
-                       shape_name(e.effect.spec().shape), e.effect.shape, shape_error);
+                       e.effect.spec().shape_name, e.effect.shape, shape_error);
   const double errors = errors_from_none(c, c.fit);
   if (!(errors > settings.sure)) return fmt::format("its size is {:.1f} standard errors from none", errors);
   return "";

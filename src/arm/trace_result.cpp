@@ -28,9 +28,12 @@ std::vector<ArmParameter> effect_parameters(const FittedEffect& fitted) {
                    "rad",
                    {std::atan2(e.values[0], e.values[1]), std::sqrt(across.dot(c * across)) / amplitude}});
   }
+  if (spec.type)
+    for (const model::TermShape& shape : spec.type->search->shapes)
+      if (!shape.refined && e.given.has(shape.name))
+        out.push_back({shape.name, "-", {e.given.at(shape.name), 0}});
   if (spec.has_shape())
-    out.push_back(
-        {shape_name(spec.shape), shape_unit(spec.shape), {e.shape, std::sqrt(fitted.covariance(2, 2))}});
+    out.push_back({spec.shape_name, spec.shape_unit, {e.shape, std::sqrt(fitted.covariance(2, 2))}});
   return out;
 }
 

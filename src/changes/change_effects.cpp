@@ -104,6 +104,7 @@ std::vector<ChangeEffect> effects_of(const model::SearchedTerm& term) {
   e.type = &type;
   e.of_load = any.follows_load();
   e.rubs = any.rubs();
+  e.ramp = any.follows_time();
   for (const model::TermShape& s : type.search->shapes)
     if (!s.refined) e.variant += " " + s.name + " " + to_text(term.given.at(s.name));
   if (!shape) return {e};
@@ -149,14 +150,6 @@ ChangeEffect ramp_of(const ChangeEffect& effect, const ChangeEffect& called) {
   return e;
 }
 
-/// Whether its law has the time: a record that changes shows it as a ramp.
-bool follows_time(const ChangeEffect& effect) {
-  Moment early{}, late{};
-  early.speed = late.speed = early.direction = late.direction = late.time = 1;
-  const OfMoment column = effect.columns().front();
-  return column(early) != column(late);
-}
-
 }  // namespace
 
 bool ChangeEffect::is_slip() const {
@@ -169,12 +162,8 @@ bool ChangeEffect::has_scale() const {
 
 bool may_be_external_torque(const std::string& effect) {
   for (const model::TermType& type : model::term_types())
-    if (type.id == effect && type.search && type.search->shapes.empty() && type.search->phase.empty() &&
-        model::shown_in(type) == model::ShownIn::torque) {
-      const model::TermColumns term(type, {});
-      const double forward = term.at(0, {0, 1, 1, 1, 1}), backward = term.at(0, {0, 2, -2, -1, -2});
-      return forward == backward;  // the same whatever the joint does
-    }
+    if (type.id == effect && model::shown_in(type) == model::ShownIn::torque && type.search->shapes.empty())
+      return model::TermColumns(type, {}).is_constant();
   return false;
 }
 
@@ -212,7 +201,7 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
     const bool weight = term.type->id == model::weight_term();
     if (weight && sampling.chain) continue;  // an effect of the chain
     const std::vector<ChangeEffect> effects = effects_of(term);
-    if (follows_time(effects.front())) {
+    if (effects.front().ramp) {
       all.push_back(ramp_of(all.front(), effects.front()));
       continue;
     }

@@ -80,12 +80,8 @@ Stretch stretch_of(const arm::ArmRig& rig, const arm::ArmRecord& record, const a
 
 double motor_friction(const arm::ArmRig& rig, std::size_t joint, const DriveEffects& effects, double position,
                       double speed, double load) {
-  const auto term = [&](arm::DriveTerm t) { return rig.joints[joint].terms[std::size_t(t)]; };
-  const double sign = std::tanh(speed / rig.friction_speed(joint));
-  return (term(arm::DriveTerm::coulomb) + term(arm::DriveTerm::load) * std::fabs(load)) * sign +
-         term(arm::DriveTerm::viscous) * speed + term(arm::DriveTerm::quadratic) * speed * std::fabs(speed) +
-         term(arm::DriveTerm::cubic) * speed * speed * speed + term(arm::DriveTerm::offset) +
-         effects.torque({position, speed, sign, load});
+  const model::JointMoment now{0, position, speed, std::tanh(speed / rig.friction_speed(joint)), load};
+  return arm::drive_friction(rig.joints[joint], now) + effects.torque(now);
 }
 
 /// Mass matrix and bias of the joints that have a gap, the others moving as their motors do.

@@ -4,15 +4,23 @@
 #include <algorithm>
 
 namespace backlash::geared_arm {
+namespace {
+
+/// Else it is a share of drives' torques.
+bool has_law(const arm::JointEffectSpec& spec) {
+  return spec.type || !spec.drive_term.empty();
+}
+
+}  // namespace
 
 DriveEffects::DriveEffects(const arm::ArmRig& rig, std::size_t joint) {
   for (const arm::JointEffect& effect : rig.joints[joint].effects) {
-    if (const auto units = effect.spec().units) {
-      momentary_.push_back({units, effect.shape, effect.values});
-    } else if (!effect.other.empty()) {
+    if (!effect.other.empty()) {
       const std::vector<std::string> names = rig.joint_names();
       const auto other = std::find(names.begin(), names.end(), effect.other);
       couplings_.emplace_back(std::size_t(other - names.begin()), effect.values[0]);
+    } else if (has_law(effect.spec()) && effect.spec().shape != arm::EffectShape::distance) {
+      momentary_.emplace_back(effect, effect.values);
     }
   }
   gain_ = 1 / (1 + recorded_more(rig.joints[joint].effects));
@@ -21,13 +29,13 @@ DriveEffects::DriveEffects(const arm::ArmRig& rig, std::size_t joint) {
 double DriveEffects::recorded_more(const std::vector<arm::JointEffect>& effects) {
   double more = 0;
   for (const arm::JointEffect& effect : effects)
-    if (!effect.spec().units && !effect.spec().has_shape() && effect.other.empty()) more += effect.values[0];
+    if (!has_law(effect.spec()) && effect.other.empty()) more += effect.values[0];
   return more;
 }
 
-double DriveEffects::torque(const arm::DriveMoment& now) const {
+double DriveEffects::torque(const model::JointMoment& now) const {
   double sum = 0;
-  for (const Momentary& m : momentary_) sum += m.values.dot(m.units(m.shape, now));
+  for (const auto& [law, values] : momentary_) sum += values.dot(law.units(now));
   return sum;
 }
 

@@ -16,11 +16,7 @@ constexpr double kFinest = M_PI / 180;  // rad: of hidden ranges; choice
 
 /// Motor friction as arm/arm_rig.h has it.
 double motor_friction(const arm::ArmRig& rig, std::size_t joint, double v, double chain) {
-  const auto term = [&](arm::DriveTerm t) { return rig.joints[joint].terms[std::size_t(t)]; };
-  const double sign = std::tanh(v / rig.friction_speed(joint));
-  return term(arm::DriveTerm::coulomb) * sign + term(arm::DriveTerm::viscous) * v +
-         term(arm::DriveTerm::quadratic) * v * std::fabs(v) + term(arm::DriveTerm::cubic) * v * v * v +
-         term(arm::DriveTerm::offset) + term(arm::DriveTerm::load) * sign * std::fabs(chain);
+  return arm::drive_friction(rig.joints[joint], {0, 0, v, std::tanh(v / rig.friction_speed(joint)), chain});
 }
 
 /// A pose and how it moves; a: as hard as the limits allow, whichever way helps.

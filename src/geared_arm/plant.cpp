@@ -95,12 +95,8 @@ double ArmPlant::mesh_torque(std::size_t joint, const double* state) const {
 }
 
 double ArmPlant::motor_friction(std::size_t joint, double position, double speed, double load) const {
-  const auto term = [&](arm::DriveTerm t) { return arm_.rig.joints[joint].terms[std::size_t(t)]; };
-  const double sign = std::tanh(speed / arm_.rig.friction_speed(joint));
-  return term(arm::DriveTerm::coulomb) * sign + drives_[joint].effects.torque({position, speed, sign, load}) +
-         term(arm::DriveTerm::load) * sign * std::fabs(load) + term(arm::DriveTerm::viscous) * speed +
-         term(arm::DriveTerm::quadratic) * speed * std::fabs(speed) +
-         term(arm::DriveTerm::cubic) * speed * speed * speed + term(arm::DriveTerm::offset);
+  const model::JointMoment now{0, position, speed, std::tanh(speed / arm_.rig.friction_speed(joint)), load};
+  return arm::drive_friction(arm_.rig.joints[joint], now) + drives_[joint].effects.torque(now);
 }
 
 double ArmPlant::motor_torque(std::size_t joint, double t) const {

@@ -98,6 +98,7 @@ TermColumns::TermColumns(const TermType& type, ParameterValues given)
 double TermColumns::torque(const Term& term, const JointMoment& m) const {
   EndTorques ends;
   term.add(motion_of(m), ends);
+  if (!term.has_dry_friction()) return -(ends.motor + ends.load);
   const double friction = type_->shapes_friction ? kProbe : 0;
   EndFriction sum;
   sum.motor.forward = sum.motor.backward = friction;
@@ -118,6 +119,16 @@ double TermColumns::at(std::size_t column, const JointMoment& moment) const {
 
 bool TermColumns::follows_load() const {
   return probes_.front()->follows_mesh_torque();
+}
+
+bool TermColumns::follows_time() const {
+  const JointMoment early{1, 1, 1, 1, 1}, late{2, 1, 1, 1, 1};
+  return at(0, early) != at(0, late);
+}
+
+bool TermColumns::is_constant() const {
+  const JointMoment forward{1, 1, 1, 1, 1, 1, 1}, backward{2, 2, -2, -1, -2, 2, -1};
+  return at(0, forward) == at(0, backward);
 }
 
 bool TermColumns::rubs() const {

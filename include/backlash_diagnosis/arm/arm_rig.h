@@ -18,6 +18,7 @@
 #include "backlash_diagnosis/arm/chain.h"
 #include "backlash_diagnosis/arm/joint_effect.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
+#include "backlash_diagnosis/model/term_columns.h"
 #include "backlash_diagnosis/record/channel_map.h"
 
 namespace backlash::arm {
@@ -45,6 +46,11 @@ struct JointDrive {
   record::ChannelMap channels;       // columns of a file with names of its own; none: the package's own names
   double training_error = 0;         // norm(r) / norm(s - mean(s)) where a fitted rig was fitted; 0: not said
 };
+
+/// Torque of one unit of a term [N m per unit], and of all terms of a drive [N m]; that of the rotor's
+/// inertia is 0, a moment has no acceleration.
+double drive_unit(DriveTerm term, const model::JointMoment& now);
+double drive_friction(const JointDrive& drive, const model::JointMoment& now);
 
 struct ArmIdentification {
   double kinematics_cutoff = 10;  // Hz, of position and speed

@@ -1,60 +1,44 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the drive of one joint of an arm shows beside the terms of its equation (arm_rig.h): torque that it
-// has to supply at the joint, N m. The laws are those of the terms of the same names of a joint by itself.
+// has to supply at the joint, N m. Every term that shows in the torque of one joint (model/term_columns.h) is
+// such an effect, but a weight, which the chain has; and
 //
-//   motor_coulomb                 T S                        dry friction that is more, or less, than the
-//   motor_viscous                 b v                        term's; the same of viscous friction
-//   cogging                       A sin(n q + p)             n periods per turn of the joint
-//   position_dependent_friction   S A sin(n q + p)
-//   stribeck                      T S exp(-(v / w_s)^2)      dry friction that is more at low speed
-//   presliding                    -2 T S exp(-x / d)         x: way since the last reversal (Dahl 1968);
-//                                                            friction T builds up over the distance d
-//   asymmetric_viscous            a |v|                      a: half the difference of the directions
-//   quadratic_drag                A v |v|
-//   load_dependent_friction       mu S |tau|                 tau: the chain's own torque
+//   motor_coulomb, motor_viscous  dry and viscous friction that is more, or less, than the drive's term
 //   motor_torque_gain             g u_j                      u_j: torque of this drive in the model; the
 //                                                            recorded torque is larger by the share g, the
 //                                                            motor's torque 1 / (1 + g) of it
 //   transmission_coupling         c u_i                      u_i: torque of the drive of joint i in the
 //                                                            model, as where the motor of a wrist sits on a
 //                                                            shaft that also turns this joint
-// S = tanh(v / v_0) as there.
+// Friction has the direction S = tanh(v / v_0) as there.
 #pragma once
 
 #include <Eigen/Core>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/yaml_reader.h"
+#include "backlash_diagnosis/model/term_columns.h"
 
 namespace backlash::arm {
 
 enum class EffectShape { none, order, speed, distance };  // what else it has beside its strength
 
-/// A drive now.
-struct DriveMoment {
-  double q, v;  // rad, rad/s
-  double sign;  // S
-  double load;  // N m, the chain's own torque
-};
-
 struct JointEffectSpec {
-  const char* id;
-  Eigen::Index columns;                  // 2: of cosine and sine, a wave along the position
-  const char *strength, *strength_unit;  // of one column; of two: the amplitude
-  bool positive;                         // > 0, as friction is
+  std::string id;
+  std::string strength, strength_unit;  // of one column; of two: the amplitude
+  Eigen::Index columns = 1;             // 2: of cosine and sine, a wave along the position
+  bool positive = false;                // > 0, as friction is
   EffectShape shape = EffectShape::none;
-  double least_order = 0;       // 1/rad, that is searched: below are links, and what drifts
-  const char* drive_term = "";  // that is the same, where the rig file has it
-  /// Torque of one unit of each value [N m]; null: more than the moment counts, or other drives do.
-  Eigen::Vector2d (*units)(double shape, const DriveMoment& now) = nullptr;
+  std::string shape_name, shape_unit;
+  double least_order = 0;                 // 1/rad, that is searched: below are links, and what drifts
+  std::string drive_term;                 // that is the same, where the rig file has it
+  const model::TermType* type = nullptr;  // of the dictionary; null: one of those above
   double most = std::numeric_limits<double>::infinity();  // of its strength, that is believed of a machine
   bool has_shape() const { return shape != EffectShape::none; }
 };
-
-const char* shape_name(EffectShape shape);  // as in files and reports
-const char* shape_unit(EffectShape shape);
 
 /// All that are known, simple ones first.
 const std::vector<JointEffectSpec>& joint_effect_specs();
@@ -64,8 +48,21 @@ struct JointEffect {
   double shape = 0;                                  // n [1/rad], w_s [rad/s] or d [rad]
   std::string other;                                 // joint i of a coupling; else empty
   Eigen::Vector2d values = Eigen::Vector2d::Zero();  // of cosine and sine [N m]; else {strength, 0}
+  ParameterValues given = {};  // numbers of its term that are neither strength nor shape
 
   const JointEffectSpec& spec() const;
+};
+
+/// The torque of an effect, but of one that is a share of drives' torques (InvalidParameter).
+class EffectLaw {
+ public:
+  explicit EffectLaw(const JointEffect& effect);
+  /// Of one unit of each value [N m]; of one column the second is 0.
+  Eigen::Vector2d units(const model::JointMoment& now) const;
+
+ private:
+  std::string drive_term_;  // of an effect that no term is
+  std::optional<model::TermColumns> term_;
 };
 
 /// Throws BadData with file, line and key.

@@ -20,19 +20,15 @@ class DriveEffects {
   static double recorded_more(const std::vector<arm::JointEffect>& effects);
 
   /// What the drive has to supply for them [N m], without gain and couplings.
-  double torque(const arm::DriveMoment& now) const;
+  double torque(const model::JointMoment& now) const;
   /// The motor's torque over what is recorded of it.
   double gain() const { return gain_; }
   /// Other joints, and the share of their drives' torque that this one has to supply.
   const std::vector<std::pair<std::size_t, double>>& couplings() const { return couplings_; }
 
  private:
-  struct Momentary {
-    decltype(arm::JointEffectSpec::units) units;
-    double shape;
-    Eigen::Vector2d values;
-  };
-  std::vector<Momentary> momentary_;
+  std::vector<std::pair<arm::EffectLaw, Eigen::Vector2d>>
+      momentary_;  // those without a memory, and their values
   std::vector<std::pair<std::size_t, double>> couplings_;
   double gain_ = 1;
 };

@@ -55,6 +55,8 @@ class TermColumns {
   double at(std::size_t column, const JointMoment& moment) const;
 
   bool follows_load() const;  // reads JointMoment::load
+  bool follows_time() const;  // reads JointMoment::time
+  bool is_constant() const;   // the same whatever the joint does
   bool rubs() const;          // dry friction, the same in both directions
 
  private:

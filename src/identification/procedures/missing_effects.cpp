@@ -15,18 +15,6 @@ constexpr double kComparable = 2;     // choice: times the squares that the best
 constexpr int kMostEffects = 4;       // choice: in one machine
 constexpr double kDrawn = 0.1;        // simulation: share of what is left that follows a column
 constexpr double kUnresolved = 1e-8;  // choice: of a column, beyond the others: nothing but rounding
-constexpr double kShort = 2;          // choice: rad of travel, up to which a turn's wave is a straight line
-constexpr double kStribeckSpeeds[] = {0.03, 0.1, 0.3};  // choice: of the speed's root of mean square
-
-double root_of_mean_square(const std::vector<double>& x) {
-  double sum = 0;
-  for (const double v : x) sum += v * v;
-  return std::sqrt(sum / double(x.size()));
-}
-
-double sign(double x) {
-  return (x > 0) - (x < 0);
-}
 
 /// What a fit of the columns to the residuals moves and leaves.
 struct Extended {
@@ -60,42 +48,44 @@ Eigen::VectorXd unexplained(const Eigen::MatrixXd& a, double left) {
   return drawn;
 }
 
-/// A wave of one period a turn, or the straight line that a short travel sees of it, times `factor`.
-EffectShapes by_position(const std::vector<double>& position, const std::vector<double>& factor) {
-  const auto [low, high] = std::minmax_element(position.begin(), position.end());
-  const double middle = 0.5 * (*low + *high);
-  EffectShapes shapes(*high - *low > kShort ? 2 : 1, factor);
-  for (std::size_t k = 0; k < position.size(); ++k) {
-    const double from_middle = position[k] - middle;
-    shapes[0][k] *= shapes.size() == 1 ? from_middle : std::sin(from_middle);
-    if (shapes.size() == 2) shapes[1][k] *= std::cos(from_middle);
+model::MotionRange range_of(const std::vector<model::JointMoment>& moments) {
+  model::MotionRange range;
+  range.from = range.to = moments.front().position;
+  for (const model::JointMoment& m : moments) {
+    range.speed += m.speed * m.speed, range.torque += m.load * m.load;
+    range.from = std::min(range.from, m.position), range.to = std::max(range.to, m.position);
   }
-  return shapes;
+  range.speed = std::sqrt(range.speed / double(moments.size()));
+  range.torque = std::sqrt(range.torque / double(moments.size()));
+  range.duration = moments.back().time - moments.front().time;
+  return range;
+}
+
+EffectShapes shapes_of(const model::TermColumns& term, const std::vector<model::JointMoment>& moments) {
+  EffectShapes all(term.count());
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (const model::JointMoment& m : moments) all[i].push_back(term.at(i, m));
+  return all;
 }
 
 }  // namespace
 
-std::vector<EffectShapes> likely_effects(const std::vector<double>& time, const std::vector<double>& position,
-                                         const std::vector<double>& speed,
-                                         const std::vector<double>& torque) {
-  const auto of = [&](auto shape) {
-    std::vector<double> out(time.size());
-    for (std::size_t k = 0; k < out.size(); ++k) out[k] = shape(k);
-    return out;
-  };
-  const auto direction = [&](std::size_t k) { return sign(speed[k]); };
-  std::vector<EffectShapes> effects{
-      by_position(position, of([](std::size_t) { return 1.0; })),
-      {of([&](std::size_t k) { return speed[k] * std::fabs(speed[k]); })},
-      {of([&](std::size_t k) { return std::fabs(speed[k]); })},
-      {of([&](std::size_t k) { return direction(k) * std::fabs(torque[k]); })},
-      by_position(position, of(direction)),
-      {of([&](std::size_t k) { return direction(k) * (time[k] - time.front()); })}};
-  const double usual = root_of_mean_square(speed);
-  for (const double share : kStribeckSpeeds)
-    effects.push_back(
-        {of([&](std::size_t k) { return direction(k) * std::exp(-std::fabs(speed[k]) / (share * usual)); })});
-  return effects;
+std::vector<EffectShapes> likely_effects(const std::vector<model::JointMoment>& moments) {
+  const model::MotionRange range = range_of(moments);
+  // Slow waves alone follow the columns of the equation: one a turn, or half of one over the travel.
+  const double slowest = std::max(1.0, 0.5 * model::order_resolution(range));
+  std::vector<EffectShapes> all;
+  for (const model::SearchedTerm& searched : model::searched_terms(model::ShownIn::torque, range)) {
+    const std::optional<ParameterSpec> shape = model::searched_shape(*searched.type);
+    std::vector<double> values = searched.shapes;
+    if (values.empty()) values.push_back(slowest);
+    ParameterValues given = searched.given;
+    for (const double value : values) {
+      if (shape) given[shape->name] = value;
+      all.push_back(shapes_of(model::TermColumns(*searched.type, given), moments));
+    }
+  }
+  return all;
 }
 
 Eigen::VectorXd drawn_by_missing(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,

@@ -8,15 +8,16 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "backlash_diagnosis/model/term_columns.h"
+
 namespace backlash::identification {
 
 /// One effect: torques over time [any unit], a linear combination of which is it.
 using EffectShapes = std::vector<std::vector<double>>;
 
-/// Gravity or a spring, drag, friction that differs between the directions, falls with speed, follows the
-/// load, the position or the time. All vectors equally long; position in rad or m, speed in its unit per s.
-std::vector<EffectShapes> likely_effects(const std::vector<double>& time, const std::vector<double>& position,
-                                         const std::vector<double>& speed, const std::vector<double>& torque);
+/// All that the dictionary has (model/term_columns.h), of waves over the position the slow ones; at least one
+/// moment.
+std::vector<EffectShapes> likely_effects(const std::vector<model::JointMoment>& moments);
 
 /// For a fit A x = b with these residuals: how far each x may be from the machine's value. Effects are added
 /// one at a time, the best first, as long as it explains a tenth of the remaining squares. At each step the

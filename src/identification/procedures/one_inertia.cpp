@@ -140,13 +140,26 @@ double floor_of(const record::Record& record, const Signals& s, double inertia, 
   return std::hypot(torque, inertia * acceleration_noise(s, s.position_noise)) / torque_size;
 }
 
+/// All samples. Friction builds up since the last reversal.
+std::vector<model::JointMoment> moments_of(const record::Record& record, const Signals& s) {
+  const std::vector<double>& position = record.column(record::Channel::motor_position);
+  const std::vector<double> speed = signal::derivative(position, s.interval);
+  std::vector<model::JointMoment> all(position.size());
+  double way = std::numeric_limits<double>::infinity(), before = 0;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    way = speed[k] * before < 0 ? 0 : way + std::fabs(speed[k]) * s.interval;
+    if (speed[k] != 0) before = speed[k];
+    const double direction = (speed[k] > 0) - (speed[k] < 0);
+    all[k] = {record.time[k] - record.time.front(), position[k], speed[k], direction, s.torque[k], way};
+  }
+  return all;
+}
+
 /// Where more is left than noise leaves, an effect that the equation lacks may have drawn the parameters.
 void allow_for_missing(Solution& solution, const Signals& s, const Eigen::MatrixXd& a,
                        const record::Record& record, double noise) {
-  const std::vector<double>& position = record.column(record::Channel::motor_position);
   std::vector<Eigen::MatrixXd> effects;
-  for (const EffectShapes& effect :
-       likely_effects(record.time, position, signal::derivative(position, s.interval), s.torque)) {
+  for (const EffectShapes& effect : likely_effects(moments_of(record, s))) {
     Eigen::MatrixXd columns(a.rows(), Eigen::Index(effect.size()));
     for (std::size_t i = 0; i < effect.size(); ++i)
       columns.col(Eigen::Index(i)) = picked(low_pass_sliding(s, effect[i]), s.used);

@@ -41,15 +41,16 @@ std::vector<double> dampings(const MotionRange& range) {
 }  // namespace
 
 TermType presliding_term() {
-  TermType type{"presliding",
-                {{"body", "-", Range::any(), "whose friction it is", false, {"motor", "load"}},
-                 {"distance", "rad", Range::not_negative(), "x_s, at the load"},
-                 {"damping", "N m s/rad", Range::not_negative(), "of the bristles; 0: Dahl's law"}},
-                [](const ParameterValues& p) -> std::unique_ptr<Term> {
-                  return std::make_unique<PreslidingTerm>(p.choice("body") == "motor", p.at("distance"),
-                                                          p.at("damping"));
-                },
-                TermSearch{"distance", "", typical, {{"damping", dampings, true}}}};
+  TermType type{
+      "presliding",
+      {{"body", "-", Range::any(), "whose friction it is", false, {"motor", "load"}},
+       {"distance", "rad", Range::not_negative(), "x_s, at the load"},
+       {"damping", "N m s/rad", Range::not_negative(), "of the bristles; 0: Dahl's law", false, {}, 0}},
+      [](const ParameterValues& p) -> std::unique_ptr<Term> {
+        return std::make_unique<PreslidingTerm>(p.choice("body") == "motor", p.at("distance"),
+                                                p.at("damping"));
+      },
+      TermSearch{"distance", "", typical, {{"damping", dampings, true}}}};
   type.shapes_friction = true;
   type.usual_of_gap = 1;  // choice: bristles are shorter than the play; a path beyond it is a soft part
   return type;

@@ -44,7 +44,7 @@ TermType stribeck_term() {
           {body_parameter(),
            {"torque", "N m", Range::not_negative(), "A, added at rest"},
            {"speed", "rad/s", Range::positive(), "ws, of the decay"},
-           {"exponent", "-", Range::between(0.1, 10), "e"}},
+           {"exponent", "-", Range::between(0.1, 10), "e", false, {}, 2}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> { return std::make_unique<Stribeck>(p); },
           TermSearch{"torque", "", clear_torque, {{"speed", speeds, true}, {"exponent", exponents, false}}}};
 }
