@@ -10,11 +10,20 @@ namespace backlash::identification {
 namespace {
 
 constexpr double kLeastExplained =
-    0.1;                              // choice: share of the squares that are left, that an effect explains
-constexpr double kComparable = 2;     // choice: times the squares that the best effect leaves
-constexpr int kMostEffects = 4;       // choice: in one machine
-constexpr double kDrawn = 0.1;        // simulation: share of what is left that follows a column
-constexpr double kUnresolved = 1e-8;  // choice: of a column, beyond the others: nothing but rounding
+    0.1;                           // choice: share of the squares that are left, that an effect explains
+constexpr double kComparable = 2;  // choice: times the squares that the best effect leaves
+constexpr int kMostEffects = 4;    // choice: in one machine
+constexpr double kDrawn = 0.1;     // simulation: share of what is left that follows a column
+// Choice: of the squares of an effect, what the equation cannot do by itself. One with less would have to be
+// more than ten
+// times as large as what is left of the torque.
+constexpr double kOwn = 0.01;
+
+Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  Eigen::MatrixXd both(b.rows(), a.cols() + b.cols());
+  both << a, b;
+  return both;
+}
 
 /// What a fit of the columns to the residuals moves and leaves.
 struct Extended {
@@ -22,22 +31,23 @@ struct Extended {
   double left = 0;        // squares
 };
 
-Extended extended(const Eigen::MatrixXd& a, const Eigen::MatrixXd& more, const Eigen::VectorXd& residuals) {
-  Eigen::MatrixXd all(a.rows(), a.cols() + more.cols());
-  all << a, more;
-  const Eigen::VectorXd length = all.colwise().norm().cwiseMax(1e-300);
-  all *= length.cwiseInverse().asDiagonal();
-  if (signal::smallest_pivot(signal::gram(all)) < kUnresolved)
-    return {Eigen::VectorXd::Zero(a.cols()), residuals.squaredNorm()};
-  const Eigen::VectorXd x =
-      signal::solve_symmetric(signal::gram(all), signal::transposed_product(all, residuals));
-  return {x.cwiseQuotient(length).head(a.cols()), (residuals - all * x).squaredNorm()};
+Eigen::VectorXd fitted(const Eigen::MatrixXd& a, const Eigen::VectorXd& y) {
+  const Eigen::VectorXd length = a.colwise().norm().cwiseMax(1e-300);
+  const Eigen::MatrixXd scaled = a * length.cwiseInverse().asDiagonal();
+  return signal::solve_symmetric(signal::gram(scaled), signal::transposed_product(scaled, y))
+      .cwiseQuotient(length);
 }
 
-Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  Eigen::MatrixXd both(b.rows(), a.cols() + b.cols());
-  both << a, b;
-  return both;
+Extended extended(const Eigen::MatrixXd& a, const Eigen::MatrixXd& more, const Eigen::VectorXd& residuals) {
+  Eigen::MatrixXd all = a;
+  for (Eigen::Index i = 0; i < more.cols(); ++i) {
+    const Eigen::VectorXd column = more.col(i), own = column - all * fitted(all, column);
+    if (!(own.squaredNorm() > kOwn * column.squaredNorm()))
+      return {Eigen::VectorXd::Zero(a.cols()), residuals.squaredNorm()};
+    all = beside(all, column);
+  }
+  const Eigen::VectorXd x = fitted(all, residuals);
+  return {x.head(a.cols()), (residuals - all * x).squaredNorm()};
 }
 
 /// How far x is moved by what no effect explains.

@@ -159,9 +159,10 @@ TEST(OneInertia, ErrorsHoldWhereAnEffectDrawsTheFrictionAndLeavesLittle) {
     EXPECT_LT(coulomb, 3 * m.coulomb.standard_error);
     EXPECT_LT(viscous, 3 * m.viscous.standard_error);
     EXPECT_LT(m.relative_error, 0.08);  // no reason for a refusal
-    // An error that holds, and is still of use: no more than twice as far as the effect drew the value.
-    EXPECT_LT(m.coulomb.standard_error, std::max(2 * coulomb, 1.0));
-    EXPECT_LT(m.viscous.standard_error, std::max(2 * viscous, 10.0));
+    // An error that holds, and is still of use: little more than twice as far as the effect drew the value,
+    // as the one counts that draws most of those of the dictionary that leave nearly as little.
+    EXPECT_LT(m.coulomb.standard_error, std::max(2.5 * coulomb, 1.0));
+    EXPECT_LT(m.viscous.standard_error, std::max(2.5 * viscous, 10.0));
   }
   EXPECT_GT(std::fabs(identify_one_inertia(simulate(drag)).viscous.value - 200), 30);  // that it matters
 }
