@@ -208,6 +208,8 @@ struct Machine {
     if (effect.id == "position_dependent_friction") return sign * size * std::sin(shape * q + 0.4);
     if (effect.id == "stribeck") return size * sign * std::exp(-v * v / (shape * shape));
     if (effect.id == "cable") return size * q;  // in no dictionary
+    if (effect.id == "eddy_current_brake")
+      return 2 * size * v * shape / (v * v + shape * shape);  // new_effect
     if (effect.id == "asymmetric_viscous") return size * std::fabs(v);
     if (effect.id == "transmission_coupling" || effect.id == "motor_torque_gain") return size * other;
     if (effect.id == "load_dependent_friction") return size * sign * std::fabs(load);
