@@ -235,7 +235,6 @@ void ArmChanges::report_joint(const ArmJoint& joint, std::size_t place) {
   std::vector<Change> kept;
   for (Change& c : one.changes) {
     add_constant_error(joint, c);
-    if (may_be_external_torque(c.effect)) c.alike.emplace_back("external_torque");
     if (is_left_by_chain(joint, place, c))
       one.warnings.push_back("since " + to_text(std::round(c.since)) +
                              " s the record follows no effect, beside " +

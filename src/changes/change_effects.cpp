@@ -160,13 +160,6 @@ bool ChangeEffect::has_scale() const {
   return type && shape > 0 && !has_order() && !of_load;
 }
 
-bool may_be_external_torque(const std::string& effect) {
-  for (const model::TermType& type : model::term_types())
-    if (type.id == effect && model::shown_in(type) == model::ShownIn::torque && type.search->shapes.empty())
-      return model::TermColumns(type, {}).is_constant();
-  return false;
-}
-
 double ChangeEffect::least_order() const {
   return rubs ? kLeastFrictionOrder : kLeastOrder;
 }

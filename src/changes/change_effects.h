@@ -41,9 +41,6 @@ struct ChangeEffect {
   std::string name() const;    // with its shape
 };
 
-/// Whether somebody who leans on a moving machine looks like this effect.
-bool may_be_external_torque(const std::string& effect);
-
 /// What is carried has weight and inertia: gravity gets a third column. None for other effects.
 std::optional<ChangeEffect> with_inertia(const ChangeEffect& effect);
 

@@ -355,6 +355,8 @@ Change ChangeSearch::change_of(const FoundChange& f, const std::vector<FoundChan
   Change change;
   change.effect = f.effect.id;
   change.alike = f.alike;
+  if (f.effect.type && !f.effect.ramp)
+    for (const std::string& other : model::looks_like(*f.effect.type)) change.alike.push_back(other);
   change.gain = f.gain;
   onset_interval(f, sums_of(f, b), b, change);
   onset_with_left(f, b, change);

@@ -139,6 +139,13 @@ bool TermColumns::rubs() const {
   return sum.motor.forward == sum.motor.backward && sum.load.forward == sum.load.backward;
 }
 
+std::vector<std::string> looks_like(const TermType& type) {
+  const bool plain =
+      shown_in(type) == ShownIn::torque && !searched_shape(type) && type.search->shapes.empty();
+  if (!plain || !TermColumns(type, {}).is_constant()) return {};
+  return {"torque_offset", "external_torque"};
+}
+
 std::optional<ParameterSpec> searched_shape(const TermType& type) {
   if (type.shapes_friction) return spec_of(type, type.search->strength);
   const std::vector<const TermShape*> all = refined_shapes(type);

@@ -80,6 +80,11 @@ TEST(TermColumns, FrictionIsThatWhichIsTheSameInBothDirections) {
   EXPECT_FALSE(rubs("cogging", {{"order", 2}}));
 }
 
+TEST(TermColumns, OnlyAConstantTorqueMayBeTheZeroOfASensor) {
+  for (const TermType& type : term_types())
+    EXPECT_EQ(looks_like(type).empty(), type.id != "asymmetric_coulomb") << type.id;
+}
+
 TEST(TermColumns, SearchedTermsHaveAllButStrengthPhaseAndOneShape) {
   const MotionRange range{10, 1, 0.01, -1, 1, 5, 1e-3};
   for (const ShownIn channel : {ShownIn::torque, ShownIn::deflection})

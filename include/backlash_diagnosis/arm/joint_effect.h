@@ -32,9 +32,9 @@ struct JointEffectSpec {
   Eigen::Index columns = 1;             // 2: of cosine and sine, a wave along the position
   bool positive = false;                // > 0, as friction is
   EffectShape shape = EffectShape::none;
-  std::string shape_name, shape_unit;
+  std::string shape_name = "", shape_unit = "";
   double least_order = 0;                 // 1/rad, that is searched: below are links, and what drifts
-  std::string drive_term;                 // that is the same, where the rig file has it
+  std::string drive_term = "";            // that is the same, where the rig file has it
   const model::TermType* type = nullptr;  // of the dictionary; null: one of those above
   double most = std::numeric_limits<double>::infinity();  // of its strength, that is believed of a machine
   bool has_shape() const { return shape != EffectShape::none; }

@@ -70,6 +70,11 @@ class TermColumns {
   std::vector<std::shared_ptr<const Term>> probes_;
 };
 
+/// What is no effect of the machine and shows as this one does: a torque that is the same whatever the joint
+/// does may be the zero of the torque's sensor ("torque_offset") or somebody who leans on it
+/// ("external_torque").
+std::vector<std::string> looks_like(const TermType& type);
+
 /// Number in which a term is not linear, that has to be searched: an order, a speed, a distance. None where
 /// there is none, or several.
 std::optional<ParameterSpec> searched_shape(const TermType& type);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "../fit/valley.h"
+#include "backlash_diagnosis/model/term_columns.h"
 #include "learned.h"
 #include "unseen_gain.h"
 
@@ -61,12 +62,14 @@ void describe(const model::Term& term, const Candidate& candidate, std::size_t t
   }
 }
 
-/// Each other effect that reaches most of the gain, once.
+/// Each other effect that reaches most of the gain, once, and what is none and looks the same.
 std::vector<std::string> ids_of(const Effect& effect) {
   std::vector<std::string> ids;
   for (const Candidate& c : effect.alternatives)
     if (c.id != effect.candidate.id && std::find(ids.begin(), ids.end(), c.id) == ids.end())
       ids.push_back(c.id);
+  for (const std::string& other : model::looks_like(model::term_type(effect.candidate.id)))
+    ids.push_back(other);
   return ids;
 }
 
