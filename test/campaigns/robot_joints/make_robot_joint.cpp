@@ -124,7 +124,8 @@ diagnosis:
 
 namespace {
 
-void make(std::uint64_t seed, const std::string& effect, double duration, const std::filesystem::path& out) {
+void make(std::uint64_t seed, const std::string& effect, double duration, double stamp_jitter,
+          const std::filesystem::path& out) {
   Random machine_stream(seed, "machine");
   Machine machine = draw_machine(machine_stream);
   if (!effect.empty()) {
@@ -141,6 +142,8 @@ void make(std::uint64_t seed, const std::string& effect, double duration, const 
     static const char* const kinds[] = {"pick", "sine", "multi", "via"};
     const std::string kind = kinds[stream.whole(0, 3)];
     runs.emplace_back(kind, run(machine, kind, duration, stream));
+    Random stamps(seed, fmt::format("stamps {}", i));
+    jitter_stamps(runs.back().second, stamp_jitter, machine.rate, stamps);
     write(out / fmt::format("m{}.csv", i), csv_of(runs.back().second));
   }
   write(out / "rig.yaml", rig_file(machine, fmt::format("robot_joint_{}", seed)));
@@ -154,13 +157,15 @@ int main(int argc, char** argv) {
   namespace po = boost::program_options;
   po::options_description options("make_robot_joint: two records of a robot's joint with truth");
   std::uint64_t seed = 1;
-  double duration = 25;
+  double duration = 25, stamp_jitter = 0;
   std::string out, effect;
   options.add_options()("help,h", "this text")("seed", po::value(&seed)->required(),
                                                "of the machine and its motions")(
       "effect", po::value(&effect),
       "one that the rig file does not know, on a joint with mild errors of its sensors")(
       "duration", po::value(&duration)->default_value(25), "of a record [s]")(
+      "stamp-jitter", po::value(&stamp_jitter)->default_value(0),
+      "of stamps alone: standard deviation, share of an interval")(
       "out", po::value(&out)->required(), "folder for m0.csv, m1.csv, rig.yaml, truth.json");
   try {
     po::variables_map given;
@@ -170,7 +175,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     po::notify(given);
-    robot_joints::make(seed, effect, duration, out);
+    robot_joints::make(seed, effect, duration, stamp_jitter, out);
     return 0;
   } catch (const po::error& error) {
     std::cerr << "make_robot_joint: " << error.what() << '\n';

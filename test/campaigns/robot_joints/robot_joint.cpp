@@ -311,4 +311,9 @@ Run run(const Machine& m, const std::string& kind, double duration, Random& rand
   return result;
 }
 
+void jitter_stamps(Run& run, double share, double rate, Random& random) {
+  constexpr double kMost = 0.49;  // of an interval: stamps stay in order
+  for (Row& row : run.rows) row.time += std::clamp(share * random.normal(), -kMost, kMost) / rate;
+}
+
 }  // namespace robot_joints

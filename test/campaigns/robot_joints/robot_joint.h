@@ -74,6 +74,10 @@ struct Run {
 /// `kind`: pick, sine, multi or via.
 Run run(const Machine& machine, const std::string& kind, double duration, Random& random);
 
+/// Stamps that are off by so much of an interval beside what the samples are (standard deviation, at most
+/// half of one), as of a message that is stamped when it arrives.
+void jitter_stamps(Run& run, double share, double rate, Random& random);
+
 std::string rig_file(const Machine& machine, const std::string& name);
 std::string truth(const Machine& machine, const std::vector<std::pair<std::string, Run>>& runs);
 
