@@ -89,8 +89,9 @@ struct SearchedTerm {
   std::vector<double> shapes;
 };
 
-/// All terms that a search of that channel may try, but those with several shapes to be searched and those
-/// that are part of how a machine is built (TermSearch::needs_turning_link, TermType::gap_variation).
+/// All terms that a search of that channel may try, but those with several shapes to be searched, those that
+/// are part of how a machine is built (TermSearch::needs_turning_link, TermType::gap_variation), and those
+/// that dry and viscous friction of other values do as well (0.4 % of square_root_friction is its own).
 std::vector<SearchedTerm> searched_terms(ShownIn channel, const MotionRange& range);
 
 }  // namespace backlash::model
