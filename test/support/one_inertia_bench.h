@@ -57,8 +57,12 @@ struct SearchBench {
 
   SearchBench(const model::Rig& rig, const std::vector<record::Record>& records)
       : data(data_of(rig, records)),
-        context{data, identification::motion_range(data), identification::SearchSettings(),
-                [](const std::string&) {}, [](const identification::Hypothesis&) {}} {
+        context{data,
+                data.front(),
+                identification::motion_range(data),
+                identification::SearchSettings(),
+                [](const std::string&) {},
+                [](const identification::Hypothesis&) {}} {
     context.settings.fit = identification::with_bands(context.settings.fit, rig, data);
   }
   explicit SearchBench(const OneInertiaMachine& machine)

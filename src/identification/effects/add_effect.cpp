@@ -11,6 +11,8 @@
 namespace backlash::identification {
 namespace {
 
+constexpr const char* kNotFitted = "the machine cannot be fitted with it at new weights";
+
 bool nothing_can_be_found(const Misfit& m, const SearchSettings& settings) {
   return std::max(m.torque, m.deflection) < settings.revision.at_floor &&
          std::max(m.torque_share, m.deflection_share) < settings.acceptance.noise;
@@ -56,8 +58,14 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
     std::vector<Effect> effects = h.effects;
     effects.push_back(
         {best.candidate, gain, alternatives(best, gain.total, trials.fitted, now, before, context), {}, {}});
-    if (auto with = refitted(h, std::move(effects), context)) return with_best_shapes(*with, context);
-    h = with_rejected(std::move(h), best.candidate.id, "the machine cannot be fitted with it at new weights");
+    auto with = refitted(h, std::move(effects), context, Settled::roughly);
+    std::string why = with ? contradicted_by_unseen(*with, context) : kNotFitted;
+    if (why.empty()) {
+      with = refitted(*with, with->effects, context);
+      if (with) return with_best_shapes(*with, context);
+      why = kNotFitted;
+    }
+    h = with_rejected(std::move(h), best.candidate.id, why);
   }
   return h;
 }

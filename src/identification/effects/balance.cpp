@@ -237,6 +237,16 @@ std::vector<Eigen::VectorXd> Balance::base(const std::vector<ServoData>& data) c
   return columns;
 }
 
+ResidualOrders Balance::orders() const {
+  std::vector<ResidualOrders::Row> rows;
+  for (const Part& part : parts_)
+    for (const bool deflection : {false, true})
+      for (const std::size_t k : deflection ? part.deflection_rows : part.torque_rows)
+        rows.push_back(
+            {deflection, true, deflection ? cutoffs_.deflection : cutoffs_.torque, part.samples[k].motion});
+  return {std::move(rows), left_, basis_};
+}
+
 Eigen::VectorXd Balance::column(const model::Term& term, double least_own) const {
   const Eigen::VectorXd change = -weights_.cwiseProduct(rows_of(term));
   Eigen::VectorXd own = change - basis_ * (basis_.transpose() * change);

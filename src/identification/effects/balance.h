@@ -14,6 +14,7 @@
 
 #include "../fit/joint_fit.h"
 #include "backlash_diagnosis/model/term.h"
+#include "residual_orders.h"
 
 namespace backlash::identification {
 
@@ -30,6 +31,8 @@ class Balance {
   /// Measured minus the part that the machine's values and the strengths of its terms explain; each channel
   /// in units of its standard deviation.
   const Eigen::VectorXd& left() const { return left_; }
+  /// How often per turn left() repeats.
+  ResidualOrders orders() const;
   /// The change of both sums by a term, less the part that the machine's own values explain, in the same
   /// units; 0 if what remains is less than `least_own` of the change.
   Eigen::VectorXd column(const model::Term& term, double least_own) const;

@@ -140,6 +140,15 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
 
 }  // namespace
 
+std::string contradicted_by_unseen(const Hypothesis& h, const SearchContext& context) {
+  const FitSettings& fit = context.settings.fit;
+  const Effect& last = h.effects.back();
+  if (simulation::load_moves_freely(h.declared->rig) && is_usual(last.candidate, h.declared->rig)) return "";
+  const Machine& before = h.effects.size() > 1 ? *h.effects.end()[-2].after : h.base->fit.machine;
+  return contradicted(predicted(before, context.unseen, fit), predicted(*last.after, context.unseen, fit),
+                      last.gain.deflection, is_learned(last.candidate.id), context.settings.belief);
+}
+
 Hypothesis believe(const Hypothesis& before, const ServoData& unseen, const SearchContext& context) {
   Hypothesis h = before;
   while (!h.effects.empty()) {

@@ -24,10 +24,6 @@ double deviation(const std::vector<double>& x) {
 
 constexpr double kResolved = 2;  // choice: periods in the travel: fewer, and whole orders are tried first
 
-// Choices: resolutions to each side of an order, and orders tried in each.
-constexpr int kAside = 2, kInResolution = 8;
-constexpr double kLobeAlike = 0.7;  // choice: of the gain of the best one, from which on another may be it
-
 constexpr double kOrderError = 0.25;  // choice: of the resolution: whole orders that are nearer look alike
 
 /// 1/rad, of an order that is one of those tried; 0 of one that the travel resolves.
@@ -216,7 +212,7 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
     if (left.norm() < settings.least_own * change.norm() || change.norm() == 0) left.setZero();
     return left;
   };
-  return screen(fit.machine.rig, ResidualOrders(fit, records, orthogonal), range, settings,
+  return screen(fit.machine.rig, orders_of_fit(fit, records, orthogonal), range, settings,
                 orthogonal.residuals(), column);
 }
 
@@ -249,39 +245,6 @@ std::vector<Candidate> screen(const model::Rig& rig, const ResidualOrders& order
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   return sorted;
-}
-
-std::vector<Candidate> with_orders_near(const Candidate& candidate, std::size_t most,
-                                        const model::MotionRange& range, const Eigen::VectorXd& left,
-                                        const ColumnOf& column) {
-  const model::TermType& type = model::term_type(candidate.id);
-  const auto& shapes = type.search->shapes;
-  const auto wave =
-      std::find_if(shapes.begin(), shapes.end(), [](const model::TermShape& shape) { return shape.wave; });
-  if (candidate.terms.size() != 1 || wave == shapes.end()) return {candidate};
-  std::vector<Candidate> all;
-  for (int k = -kAside * kInResolution; k <= kAside * kInResolution; ++k) {
-    all.push_back(candidate);
-    double& order = all.back().terms[0][wave->name];
-    order = std::max(0.0, order + k * model::order_resolution(range) / kInResolution);
-  }
-  for_each_in_parallel(int(all.size()), [&](int i) {
-    Candidate& c = all[std::size_t(i)];
-    if (!(c.terms[0].at(wave->name) > 0)) return void(c.gain = 0);
-    Probed p{&type, c.terms[0], "", c.terms[0].at(type.search->strength)};
-    probe(p, column);
-    c = single(p, left);
-  });
-  std::vector<Candidate> tops;
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (all[i].gain > 0 && (i == 0 || all[i].gain >= all[i - 1].gain) &&
-        (i + 1 == all.size() || all[i].gain > all[i + 1].gain))
-      tops.push_back(holding(all[i], range));
-  std::stable_sort(tops.begin(), tops.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
-  while (tops.size() > most || (!tops.empty() && tops.back().gain < kLobeAlike * tops[0].gain))
-    tops.pop_back();
-  return tops.empty() ? std::vector<Candidate>{candidate} : tops;
 }
 
 std::vector<std::shared_ptr<const model::Term>> probed_terms(const Candidate& candidate) {

@@ -41,12 +41,6 @@ std::vector<Candidate> screen(const model::Rig& rig, const ResidualOrders& order
                               const model::MotionRange& range, const ScreenSettings& settings,
                               const Eigen::VectorXd& left, const ColumnOf& column);
 
-/// With at most so many orders of its wave, near the one that it has, that explain most and nearly as much,
-/// best first; strength and phase with them. The candidate itself where it has no wave.
-std::vector<Candidate> with_orders_near(const Candidate& candidate, std::size_t most,
-                                        const model::MotionRange& range, const Eigen::VectorXd& left,
-                                        const ColumnOf& column);
-
 /// All terms of a candidate, one that has a phase as sine and cosine.
 std::vector<std::shared_ptr<const model::Term>> probed_terms(const Candidate& candidate);
 

@@ -21,7 +21,8 @@ std::optional<SeveralMachines> contradicting_records(const model::Rig& declared,
   std::vector<RecordAlone> records;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::vector<ServoData> alone = {i < context.data.size() ? context.data[i] : unseen};
-    const SearchContext own{alone, context.range, context.settings, context.report, [](const Hypothesis&) {}};
+    const SearchContext own{
+        alone, unseen, context.range, context.settings, context.report, [](const Hypothesis&) {}};
     const auto fitted = attempted([&] { return fit_declared(declared, own); });
     if (!fitted) return std::nullopt;
     records.push_back({names[i], fitted_values(*fitted->base, fitted->declared->parameters.size()).machine,

@@ -263,7 +263,7 @@ std::optional<SeveralMachines> several_of(const model::Rig& declared, const Reco
   };
   return contradicting_records(
       declared, records.names, records.test, left,
-      {records.train, motion_range(records.train), settings, report, [](const auto&) {}});
+      {records.train, records.test, motion_range(records.train), settings, report, [](const auto&) {}});
 }
 
 }  // namespace

@@ -28,14 +28,15 @@ bool has_vanished(const FitParameter& p, const model::Rig& rig, const model::Rig
          p.get(rig) <= 0;
 }
 
-BandFit fit_with_effects(Machine machine, bool delay, const SearchContext& context) {
+BandFit fit_with_effects(Machine machine, bool delay, Settled settled, const SearchContext& context) {
   const FitSettings& settings = context.settings.fit;
   if (delay)
     without_calibration(machine);
   else
     machine.largest_delay = Machine().largest_delay;  // calibration may have stood in for the effect
-  Machine rough =
-      fit_settled(context.data, machine, settings.cutoff, settings.rough_tolerance, settings).fit.machine;
+  BandFit fitted = fit_settled(context.data, machine, settings.cutoff, settings.rough_tolerance, settings);
+  if (settled == Settled::roughly) return fitted;
+  Machine rough = fitted.fit.machine;
   if (!delay) {
     restore_hold(rough);
     limit_delay(rough, settings.calibration_delay);
@@ -119,9 +120,10 @@ Hypothesis with_held(const Hypothesis& h, const FitParameter& parameter, double 
 }
 
 std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,
-                                   const SearchContext& context) {
-  auto fit = attempted(
-      [&] { return fit_with_effects(start_with(h, effects, context), has(effects, is_delay), context); });
+                                   const SearchContext& context, Settled settled) {
+  auto fit = attempted([&] {
+    return fit_with_effects(start_with(h, effects, context), has(effects, is_delay), settled, context);
+  });
   if (!fit) return std::nullopt;
   Hypothesis other = h;
   other.fitted = std::make_shared<const BandFit>(std::move(*fit));

@@ -39,9 +39,11 @@ struct Hypothesis {
   std::vector<RejectedEffect> rejected;  // the latest last
 };
 
-/// What all steps read, and to whom they report. `settings.fit` has its bands.
+/// What all steps read, and to whom they report: `data` are searched, `unseen` is only asked. `settings.fit`
+/// has its bands.
 struct SearchContext {
   const std::vector<ServoData>& data;
+  const ServoData& unseen;
   model::MotionRange range;
   SearchSettings settings;
   std::function<void(const std::string& phase)> report;      // throws Cancelled
@@ -72,9 +74,12 @@ Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, cons
 /// A hypothesis to start a fit from, with this parameter of the machine at `value` and no longer fitted.
 Hypothesis with_held(const Hypothesis& h, const FitParameter& parameter, double value);
 
+/// How well a fit has to settle: roughly, to choose among several, or as what is kept.
+enum class Settled { roughly, wholly };
+
 /// The same machine with these effects instead, fitted at weights of its own. Nothing where that fails.
 std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,
-                                   const SearchContext& context);
+                                   const SearchContext& context, Settled settled = Settled::wholly);
 
 /// The result of a fit, or nothing where the model cannot be fitted or followed.
 template <typename Fit>

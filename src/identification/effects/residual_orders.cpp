@@ -18,8 +18,8 @@ double highest_order(double speed, double cutoff) {
   return kPasses * 2 * M_PI * cutoff / std::max(std::fabs(speed), slowest);
 }
 
-ResidualOrders::ResidualOrders(const MachineFit& fit, const RecordSet& records, const OrthogonalPart& left)
-    : left_(left) {
+ResidualOrders orders_of_fit(const MachineFit& fit, const RecordSet& records, const OrthogonalPart& left) {
+  std::vector<ResidualOrders::Row> rows;
   std::vector<ServoResiduals> of;
   for (std::size_t i = 0; i < records.records().size(); ++i)
     of.push_back(records.records()[i].residuals(fit.machine.rig, fit.machine.calibrations[i]));
@@ -28,12 +28,13 @@ ResidualOrders::ResidualOrders(const MachineFit& fit, const RecordSet& records, 
     const ServoData& d = record.data();
     const ServoResiduals& r = of[row.record];
     const std::size_t k = row.sample;
-    rows_.push_back(
+    rows.push_back(
         {row.deflection,
          row.deflection ? !r.deflection.empty() && record.settled[k] : bool(record.counts[k]),
          record.cutoff,
          {row.time, d.motor[k], d.motor_rate[k], r.load->load[k], r.load->load_rate[k], r.mesh_torque[k]}});
   }
+  return {std::move(rows), left.residuals(), left.basis()};
 }
 
 signal::OrderSpectrum ResidualOrders::spectrum(const model::WaveOver& wave,
@@ -45,13 +46,13 @@ signal::OrderSpectrum ResidualOrders::spectrum(const model::WaveOver& wave,
     if (row.deflection != wave.deflection || !row.counts) continue;
     const model::WaveMoment at = wave.at(row.motion, choices);
     places.push_back(Eigen::Index(i));
-    s.value.push_back(left_.residuals()[Eigen::Index(i)]);
+    s.value.push_back(residuals_[Eigen::Index(i)]);
     s.position.push_back(at.position);
     s.carrier.push_back(at.carrier);
     s.highest.push_back(highest_order(at.speed, row.cutoff));
   }
-  Eigen::MatrixXd known(Eigen::Index(places.size()), left_.basis().cols());
-  for (std::size_t i = 0; i < places.size(); ++i) known.row(Eigen::Index(i)) = left_.basis().row(places[i]);
+  Eigen::MatrixXd known(Eigen::Index(places.size()), known_.cols());
+  for (std::size_t i = 0; i < places.size(); ++i) known.row(Eigen::Index(i)) = known_.row(places[i]);
   return signal::order_spectrum(s, kLargest, known);
 }
 

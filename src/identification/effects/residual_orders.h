@@ -15,20 +15,25 @@ double highest_order(double speed, double cutoff);
 
 class ResidualOrders {
  public:
-  /// `left` is of `fit`; all must outlive it.
-  ResidualOrders(const MachineFit& fit, const RecordSet& records, const OrthogonalPart& left);
-
-  /// Of the residual, with the machine's own parameters fitted at the same time.
-  signal::OrderSpectrum spectrum(const model::WaveOver& wave, const ParameterValues& choices) const;
-
- private:
   struct Row {
     bool deflection, counts;
     double cutoff;  // Hz
     model::Motion motion;
   };
-  const OrthogonalPart& left_;
+  /// One residual per row, orthogonal to the columns of `known`, which are orthonormal.
+  ResidualOrders(std::vector<Row> rows, Eigen::VectorXd residuals, Eigen::MatrixXd known)
+      : rows_(std::move(rows)), residuals_(std::move(residuals)), known_(std::move(known)) {}
+
+  /// Of the residual, with what is known fitted at the same time.
+  signal::OrderSpectrum spectrum(const model::WaveOver& wave, const ParameterValues& choices) const;
+
+ private:
   std::vector<Row> rows_;
+  Eigen::VectorXd residuals_;
+  Eigen::MatrixXd known_;
 };
+
+/// `left` is of `fit`.
+ResidualOrders orders_of_fit(const MachineFit& fit, const RecordSet& records, const OrthogonalPart& left);
 
 }  // namespace backlash::identification

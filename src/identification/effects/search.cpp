@@ -13,10 +13,6 @@
 namespace backlash::identification {
 namespace {
 
-// Choice (time): of a wave, orders that are fitted. The spectrum is of slow motion, and a joint that moves
-// between few places has lobes as high as the order itself: the unseen record shows that it was another.
-constexpr std::size_t kLobes[] = {0, 1, 3};
-
 /// What is reported on the way: a share that never falls back when effects are taken out again, and the best
 /// so far.
 class SearchProgress {
@@ -72,14 +68,14 @@ Hypothesis believe_all(const Hypothesis& before, const Hypothesis& declared, con
 /// out: one that is not there would spoil those before it. Or no more than every machine has. Adds why others
 /// were rejected.
 std::optional<Hypothesis> plain_effects(Hypothesis& declared, const ServoData& unseen,
-                                        const SearchContext& context, std::size_t lobes) {
+                                        const SearchContext& context) {
   const auto named = [](const Hypothesis& h) {
     return std::any_of(h.effects.begin(), h.effects.end(),
                        [&](const Effect& effect) { return !is_usual(effect.candidate, h.declared->rig); });
   };
   std::optional<Hypothesis> found;
   for (Hypothesis h = declared; h.effects.size() < context.settings.asked.most_effects;) {
-    const Hypothesis more = add_plain_effect(h, context, lobes);
+    const Hypothesis more = add_plain_effect(h, context);
     if (more.effects.size() == h.effects.size()) break;
     h = more;
     const Hypothesis whole = add_shape_of_friction(h, context);
@@ -106,7 +102,10 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
                             const Progress& progress) {
   SearchProgress reported(settings, progress);
   const Interruption interruption([&] { return reported.goes_on(); });  // fits of minutes end when asked to
-  const SearchContext context{data, motion_range(data), settings,
+  const SearchContext context{data,
+                              unseen,
+                              motion_range(data),
+                              settings,
                               [&](const std::string& p) { reported.phase(p); },
                               [&](const Hypothesis& h) { reported.hypothesis(h); }};
   SearchResult result{fit_declared(declared, context), {}};
@@ -114,14 +113,9 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
     result.found = believe_compliance(result.declared, unseen, context);
     return result;
   }
-  for (const std::size_t lobes : kLobes) {
-    if (lobes > 0 && result.declared.rejected.empty()) break;  // nothing that another order could mend
-    const auto plain = plain_effects(result.declared, unseen, context, lobes);
-    const double most = settings.acceptance.near_floor;  // another order must leave nothing else
-    if (plain && (lobes == 0 || std::max(misfit(*plain).torque, misfit(*plain).deflection) < most)) {
-      result.found = *plain;
-      return result;
-    }
+  if (const auto plain = plain_effects(result.declared, unseen, context)) {
+    result.found = *plain;
+    return result;
   }
   Hypothesis h = add_effects_or_teeth(result.declared, context);
   h = drop_superfluous(h, context);

@@ -26,8 +26,7 @@ struct TrialSettings {
   std::size_t most = 6;       // choice (time): candidates
   double worth_trying = 0.2;  // choice: of the best predicted gain
   double least_predicted =
-      0.3;               // simulation: of the gain that is asked for; sensitivities mislead by so much
-  double far_off = 1.2;  // simulation: times the wanted residuals, after the rough half of a fit
+      0.3;  // simulation: of the gain that is asked for; sensitivities mislead by so much
   double tie =
       0.005;  // choice: of the residuals: then the term with the fewest shapes, gravity before cogging
 };

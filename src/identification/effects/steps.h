@@ -20,11 +20,10 @@ bool is_usual(const Candidate& candidate, const model::Rig& rig);
 Hypothesis add_shape_of_friction(const Hypothesis& h, const SearchContext& context);
 
 /// One more named effect, that which two encoders show plainly to explain most; none of a machine with one.
-/// Waves have the order that the spectrum shows, or so many of those near it (`lobes` > 0) that explain most.
-Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context, std::size_t lobes);
+Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context);
 
-/// One more named effect: the first of the best trials that convinces and that the machine can be fitted
-/// with.
+/// One more named effect: the first of the best trials that convinces, that the machine can be fitted with
+/// and that the unseen record bears out. Nothing is built upon one that believe() would take out again.
 Hypothesis add_effect(const Hypothesis& h, const SearchContext& context);
 /// Named effects until nothing helps.
 Hypothesis add_effects(const Hypothesis& h, const SearchContext& context);
@@ -60,6 +59,8 @@ Hypothesis add_learned(const Hypothesis& h, const SearchContext& context);
 /// No effects where they leave more than they explain: they may be stand-ins for what has no name.
 Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
 
+/// Why the unseen record does not bear out the last effect; empty: it does.
+std::string contradicted_by_unseen(const Hypothesis& h, const SearchContext& context);
 /// Without the effects that the unseen record does not bear out, or whose strength does not stand out of its
 /// error.
 Hypothesis believe(const Hypothesis& h, const ServoData& unseen, const SearchContext& context);

@@ -41,8 +41,7 @@ std::size_t shape_count(const Trial& trial) {
 
 }  // namespace
 
-std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, const SearchContext& context,
-                           double wanted) {
+std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, const SearchContext& context) {
   const SearchSettings& settings = context.settings;
   const RecordSet& records = h.fitted->records;
   Trial trial{candidate, {}, {}, 0};
@@ -50,12 +49,7 @@ std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, cons
     trial.start = with_vanished_again(extended(h.fitted->fit.machine, candidate, context), *h.declared);
     if (is_delay(candidate.id)) move_delay_to_term(trial.start, context.data.front().interval);
     const bool map = trial.start.has_map;
-    const MachineFit rough =
-        fit_machine(trial.start, records, fit_options(settings.fit, settings.fit.rough_tolerance, map));
-    if (rough.fit.residuals.norm() > settings.trials.far_off * wanted)
-      throw CannotIdentify("far from the residual that is wanted");
-    trial.start = rough.machine;
-    return fit_machine(trial.start, records, fit_options(settings.fit, settings.fit.tolerance, map));
+    return fit_machine(trial.start, records, fit_options(settings.fit, settings.fit.rough_tolerance, map));
   });
   if (!fit) return std::nullopt;
   trial.fit = *fit;
@@ -110,11 +104,11 @@ Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchCont
   Candidate free = trial.candidate;
   free.held_orders.clear();
   context.report("fitting the order of " + free.id);
-  const auto fitted = tried(h, free, context, trial.residual);
+  const auto fitted = tried(h, free, context);
   if (!fitted) return trial;
   Trial best = trial;
   for (const Candidate& whole : at_whole_orders(fitted->candidate, held)) {
-    auto rounded = tried(h, whole, context, best.residual);
+    auto rounded = tried(h, whole, context);
     if (rounded && left(*rounded) < left(best)) best = std::move(*rounded);
   }
   return left(*fitted) < context.settings.revision.clearly_less * left(best) ? *fitted : best;

@@ -2,7 +2,6 @@
 // A candidate fitted together with the machine.
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -17,10 +16,9 @@ struct Trial {
   double residual = 0;  // norm of all rows
 };
 
-/// Fits machine and candidate with the weights of the hypothesis, so that fits can be compared. Nothing if
-/// the fit fails, or is far from the wanted residual after its rough half.
-std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, const SearchContext& context,
-                           double wanted = std::numeric_limits<double>::infinity());
+/// Fits machine and candidate roughly, with the weights of the hypothesis, so that fits can be compared.
+/// Nothing if the fit fails.
+std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, const SearchContext& context);
 
 struct Trials {
   std::vector<Trial> fitted;             // best first; of those that tie the simplest

@@ -45,17 +45,19 @@ bool is_usual(const Candidate& candidate, const model::Rig& rig) {
 Hypothesis add_shape_of_friction(const Hypothesis& before, const SearchContext& context) {
   Hypothesis h = before;
   const model::Rig& rig = h.declared->rig;
-  if (!simulation::load_moves_freely(rig)) return h;
+  if (!simulation::load_moves_freely(rig) || clearly_right(misfit(h), context)) return h;
   for (const model::TermType& type : model::term_types()) {
     if (!type.shapes_friction || !(usual_strength(type, rig) > 0)) continue;
     for (const Candidate& candidate : usual_candidates(type, rig, context.range)) {
       context.report("fit of how friction builds up");
       std::vector<Effect> effects = h.effects;
       effects.push_back({candidate, {}, {}, {}, {}});
-      auto with = refitted(h, std::move(effects), context);
-      if (with && is_usual(with->effects.back().candidate, rig) &&
-          size(*with) < (1 - context.settings.asked.least_gain) * size(h))
-        h = std::move(*with);
+      auto with = refitted(h, std::move(effects), context, Settled::roughly);
+      if (!with || !is_usual(with->effects.back().candidate, rig) ||
+          size(*with) >= (1 - context.settings.asked.least_gain) * size(h))
+        continue;
+      with = refitted(*with, with->effects, context);
+      if (with) h = std::move(*with);
     }
   }
   return h;

@@ -191,7 +191,11 @@ Outcomes identified(const model::Rig& declared, const record::Record& record, co
 Outcomes traced(const model::Rig& declared, const record::Record& record, const model::Rig& truth,
                 const std::string& id) {
   const std::vector<ServoData> data = {traced_data(record, declared)};
-  SearchContext context{data, motion_range(data), SearchSettings(TraceSettings()), [](const std::string&) {},
+  SearchContext context{data,
+                        data.front(),
+                        motion_range(data),
+                        SearchSettings(TraceSettings()),
+                        [](const std::string&) {},
                         [](const Hypothesis&) {}};
   context.settings.fit = with_bands({}, declared, data);
   Hypothesis h = fit_declared(declared, context);

@@ -45,36 +45,6 @@ TEST(Screen, PutsTheAddedEffectFirst) {
   for (std::size_t i = 1; i < all.size(); ++i) EXPECT_LE(all[i].gain, all[i - 1].gain);
 }
 
-// A joint that rests at two places 0.6 rad apart, and is seen ten times between them: an order beside
-// the true one by a resolution, 2 pi / 0.6, has the same phase at both.
-TEST(OrdersNear, OfAMotionBetweenTwoPlacesTheTrueOneIsAmongThem) {
-  model::MotionRange range;
-  range.from = 0, range.to = 0.6;
-  const double resolution = model::order_resolution(range), order = 200;
-  std::vector<double> places;
-  for (int i = 0; i < 400; ++i) places.push_back((i % 2 == 0 ? 0 : 0.58) + 0.02 * i / 400);
-  for (int i = 0; i < 10; ++i) places.push_back(0.02 + 0.03 * i);
-  const auto wave = [&](const ParameterValues& v) {
-    Eigen::VectorXd torque(Eigen::Index(places.size()));
-    for (std::size_t i = 0; i < places.size(); ++i)
-      torque[Eigen::Index(i)] = v.at("amplitude") * std::sin(v.at("order") * places[i] + v.at("phase"));
-    return torque;
-  };
-  const Eigen::VectorXd left = -wave({{"amplitude", 1.1}, {"order", order}, {"phase", 0.7}});
-  const Candidate aside{"cogging", {{{"amplitude", 0.5}, {"order", order + resolution}, {"phase", 0.1}}}};
-  const auto near =
-      with_orders_near(aside, 3, range, left, [&](const model::Term& t) { return wave(t.values); });
-  ASSERT_GT(near.size(), 1u);
-  EXPECT_LE(near.size(), 3u);
-  EXPECT_NEAR(near[0].terms[0].at("order"), order, 1e-9);
-  EXPECT_NEAR(near[0].terms[0].at("amplitude"), 1.1, 1e-9);
-  EXPECT_NEAR(near[0].terms[0].at("phase"), 0.7, 1e-9);
-  EXPECT_NEAR(near[0].gain, 1, 1e-9);
-  EXPECT_EQ(
-      with_orders_near(aside, 1, range, left, [&](const model::Term& t) { return wave(t.values); }).size(),
-      1u);
-}
-
 TEST(Trial, IsTheFitOfMachineAndEffectTogether) {
   const SearchBench bench{with_cogging()};
   const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
@@ -84,13 +54,6 @@ TEST(Trial, IsTheFitOfMachineAndEffectTogether) {
   EXPECT_NEAR(trial->candidate.terms[0].at("phase"), 0.6, 0.03);
   EXPECT_NEAR(trial->fit.machine.rig.motor.inertia, 2, 0.03);
   EXPECT_LT(trial->residual, 0.5 * h.fitted->fit.fit.residuals.norm());
-}
-
-TEST(Trial, EndsHalfWayWhereItIsFarFromWhatIsWanted) {
-  const SearchBench bench{with_cogging()};
-  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
-  EXPECT_FALSE(tried(h, test::cogging_effect(0.5, 40, 0.3).candidate, bench.context,
-                     0.1 * h.fitted->fit.fit.residuals.norm()));
 }
 
 // The error of a frequency over an even record, sqrt(24 / N) / T noise / amplitude (Rife and Boorstyn 1974,
