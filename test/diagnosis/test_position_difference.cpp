@@ -82,6 +82,17 @@ TEST(PositionDifference, NoiseOfTheTorqueIsNoPlay) {
     }
 }
 
+// The friction of the load, 10 N m, and not its inertia says which flank is pressed.
+TEST(PositionDifference, ADraggedLoadShowsItsPlay) {
+  Servo servo;
+  servo.load_inertia = 0.5;
+  servo.load_coulomb = 10;
+  const Estimate e = estimate_position_difference(servo.record(), settings(servo));
+  ASSERT_EQ(e.status, Status::ok) << e.message;
+  EXPECT_LE(e.angle_lower, kGap) << e.message;
+  EXPECT_GE(e.angle_upper, kGap) << e.message;
+}
+
 // A light load is dragged: each flank is pressed in one direction of motion only, as dry friction of the
 // motor would have it. The load's own friction, declared to 30 %, is what presses it.
 TEST(PositionDifference, PlayOfALoadThatIsDraggedIsNoFrictionOfTheMotor) {
