@@ -114,7 +114,8 @@ bool FlankReading::choose(bool begins) {
   std::vector<int> sides(std::size_t(n), 0);
   for (Index i = 0; i < n; ++i) {
     const double per_torque = start_.factor * elastic_ / torque_.level;
-    const double clear = begins ? kClearly * torque_.level : kClear * start_.scale / per_torque;
+    const double clear = begins ? kClearly * torque_.level
+                                : std::min(kClearly * torque_.level, kClear * start_.scale / per_torque);
     const double least =
         std::max(clear, kClear * torque_.noise) + torque_.unsure.row(i).norm() + torque_.still[i];
     const int side = torque[i] > least ? 1 : torque[i] < -least ? -1 : 0;
