@@ -74,6 +74,7 @@ Estimate by_lost_motion(const DiagnosisInput& in) {
 
 Estimate by_position_difference(const DiagnosisInput& in) {
   if (!in.settings.position_difference) return not_served("the rig has no elastic deflection to go by");
+  if (in.lock_contradicted) return not_locked(*in.lock_contradicted);
   return estimate_position_difference(in.record, *in.settings.position_difference);
 }
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/record/encoder_skew.h"
+#include "backlash_diagnosis/record/even_grid.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
@@ -18,11 +18,11 @@ namespace backlash::diagnosis {
 namespace {
 
 constexpr double kThrown = 0.1;  // of the rms speed, thrown within a sample: choice
-constexpr double kBroken = 1.5;  // intervals between samples, beyond which they are no neighbours
+constexpr std::size_t kFewestSamples = 64, kThrows = 4;
 
 }  // namespace
 
-FlankTorque torque_at_flanks(const record::Record& record, const PositionDifferenceSettings& settings) {
+MotorTorque torque_at_flanks(const record::Record& record, const PositionDifferenceSettings& settings) {
   using record::Channel;
   for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque})
     if (record.has(channel)) return {record.column(channel), 1};
@@ -35,27 +35,34 @@ FlankTorque torque_at_flanks(const record::Record& record, const PositionDiffere
 }
 
 TwoEncoders two_encoders(const record::Record& record, const PositionDifferenceSettings& settings) {
-  for (const record::Channel channel : {record::Channel::motor_position, record::Channel::load_position})
+  using record::Channel;
+  for (const Channel channel : {Channel::motor_position, Channel::load_position})
     if (!record.has(channel))
       throw Refusal{Status::insufficient_data, "the record has no " + record::channel_name(channel)};
-  const FlankTorque source = torque_at_flanks(record, settings);
-  const std::vector<double>& torque = source.values;
-  const auto &q_motor = record.column(record::Channel::motor_position),
-             &q_load = record.column(record::Channel::load_position);
-  TwoEncoders motion;
-  motion.interval = record.sampling_interval();
-  double last = -INFINITY;
+  const MotorTorque source = torque_at_flanks(record, settings);
+  record::Record whole;
+  whole.unsure_time = record.unsure_time;
+  auto &motor = whole.column(Channel::motor_position), &load = whole.column(Channel::load_position),
+       &torque = whole.column(Channel::motor_torque);
   for (std::size_t i = 0; i < record.size(); ++i) {
-    if (!std::isfinite(torque[i]) || !std::isfinite(q_motor[i]) || !std::isfinite(q_load[i])) continue;
-    motion.unbroken.push_back(record.time[i] - last < kBroken * motion.interval);
-    last = record.time[i];
-    motion.torque.push_back(source.factor * torque[i]);
-    motion.motor.push_back(q_motor[i]);
-    motion.load.push_back(settings.load_ratio * q_load[i]);
+    const double values[] = {source.values[i], record.column(Channel::motor_position)[i],
+                             record.column(Channel::load_position)[i]};
+    if (!std::all_of(std::begin(values), std::end(values), [](double v) { return std::isfinite(v); }))
+      continue;
+    whole.time.push_back(record.time[i]);
+    torque.push_back(source.factor * values[0]);
+    motor.push_back(values[1]), load.push_back(settings.load_ratio * values[2]);
   }
-  if (motion.motor.size() < 16 * kShortestWindow)
+  if (whole.size() < kFewestSamples)
     throw Refusal{Status::insufficient_data,
-                  "the record has only " + std::to_string(motion.motor.size()) + " usable samples"};
+                  "the record has only " + std::to_string(whole.size()) + " usable samples"};
+  const record::EvenGrid even = record::even_grid(whole);
+  TwoEncoders motion;
+  motion.interval = even.record.sampling_interval();
+  motion.torque = even.record.column(Channel::motor_torque);
+  motion.motor = even.record.column(Channel::motor_position);
+  motion.load = even.record.column(Channel::load_position);
+  for (std::size_t i = 0; i < even.record.size(); ++i) motion.recorded.push_back(!even.lost[i]);
   return motion;
 }
 
@@ -68,23 +75,12 @@ TwoEncoders without_skew(TwoEncoders motion, double skew) {
   const double samples = skew / motion.interval;
   motion.load = signal::delayed(motion.load, -samples);
   const long reach = std::lround(std::ceil(std::abs(samples))) + 2, n = long(motion.motor.size());
-  std::vector<char> unbroken = motion.unbroken;
+  const std::vector<char> before = motion.recorded;
   for (long i = 0; i < n; ++i) {
-    if (motion.unbroken[i] && i >= reach && i < n - reach) continue;
-    for (long k = std::max(0L, i - reach); k <= std::min(n - 1, i + reach); ++k) unbroken[k] = false;
+    if (before[i] && i >= reach && i < n - reach) continue;
+    for (long k = std::max(0L, i - reach); k <= std::min(n - 1, i + reach); ++k) motion.recorded[k] = false;
   }
-  motion.unbroken = std::move(unbroken);
   return motion;
-}
-
-signal::Measured clear_skew(const TwoEncoders& motion, double inertia) {
-  try {
-    const signal::Measured skew =
-        record::encoder_skew({motion.interval, motion.torque, motion.motor, motion.load, inertia});
-    if (record::is_clear(skew)) return skew;
-  } catch (const CannotIdentify&) {  // too short, or too little moves
-  }
-  return {0, 0};
 }
 
 bool load_travels(const TwoEncoders& motion) {
@@ -117,7 +113,7 @@ void require_possible(const TwoEncoders& motion, double inertia) {
 
 void require_steady(const TwoEncoders& motion, double inertia) {
   if (!(inertia > 0)) return;
-  const std::size_t n = motion.motor.size(), lag = kShortestWindow;
+  const std::size_t n = motion.motor.size(), lag = kThrows;
   double alternates = 0, squares = 0;
   for (std::size_t i = 1; i + 1 < n; ++i)
     alternates += 0.25 * std::abs(motion.torque[i - 1] - 2 * motion.torque[i] + motion.torque[i + 1]);

@@ -8,8 +8,8 @@
 
 #include <optional>
 
-#include "backlash_diagnosis/diagnosis/flank_fit.h"
 #include "backlash_diagnosis/diagnosis/position_difference.h"
+#include "flank_windows.h"
 
 namespace backlash::diagnosis {
 

@@ -82,6 +82,14 @@ std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   return s;
 }
 
+/// N m that declared terms take of the load at rest in the middle of the gap, at the axis of motor_position.
+std::function<double(double)> declared_load(const std::shared_ptr<const model::GearTrain>& train,
+                                            double ratio) {
+  return [train, ratio](double q) {
+    return -train->load_forces(model::Motion{0, q / ratio, 0, q / ratio, 0, 0}).net / ratio;
+  };
+}
+
 /// The same, with its values at the axis of motor_position.
 std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
     const model::Rig& rig, const std::shared_ptr<const model::GearTrain>& train) {
@@ -104,10 +112,7 @@ std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
   for (const double value : {s.motor_inertia, s.load_inertia, s.stiffness, s.damping})
     if (!(value > 0)) return std::nullopt;
   if (rig.terms.empty()) return s;
-  // Both at the load side, with the load in the middle of the gap.
-  s.load_torque = [train, ratio](double q) {
-    return -train->load_forces(model::Motion{0, q / ratio, 0, q / ratio, 0, 0}).net / ratio;
-  };
+  s.load_torque = declared_load(train, ratio);
   s.motor_torque = [train, ratio](double q) {
     return -train->motor_forces(model::Motion{0, q / ratio, 0, q / ratio, 0, 0}).net / ratio;
   };
@@ -153,7 +158,13 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
       return train->elastic_deflection(torque) - torque / stiffness;
     };
   }
-  difference.load_ratio = momentum.load_ratio = rig.motor_axis_ratio();
+  const double ratio = rig.motor_axis_ratio();
+  difference.load_ratio = momentum.load_ratio = ratio;
+  difference.load_inertia =
+      (rig.gear.inertia + rig.output_coupling.inertia + rig.link.inertia) / (ratio * ratio);
+  difference.load_damping = rig.link.viscous_damping / (ratio * ratio);
+  difference.load_friction = rig.link.coulomb_friction / ratio;
+  if (!rig.terms.empty()) difference.load_torque = declared_load(train, ratio);
   difference.encoder_skew = rig.encoder_skew;
   difference.base_radius = momentum.base_radius = base_radius;
 }

@@ -76,7 +76,7 @@ TEST(Diagnose, ALockThatMovesIsReportedNotMeasured) {
     EXPECT_EQ(by(method, d.estimates).status, Status::out_of_domain);
     EXPECT_NE(by(method, d.estimates).message.find("locked"), std::string::npos);
   }
-  EXPECT_EQ(d.verdict.grade, Grade::cannot_tell);
+  EXPECT_EQ(d.verdict.grade, Grade::cannot_tell) << d.verdict.message;
 }
 
 TEST(Diagnose, OneMethod) {
