@@ -1,0 +1,3 @@
+diagnose_record: w.csv:1: empty, expected column names
+Command exited with non-zero status 65
+0.01
