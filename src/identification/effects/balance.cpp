@@ -103,11 +103,11 @@ Balance::Balance(const Machine& machine, const std::vector<ServoData>& data, con
 void Balance::scale(const Eigen::VectorXd& signal) {
   double square[2] = {0, 0}, count[2] = {0, 0};
   for (Eigen::Index i = 0; i < signal.size(); ++i) {
-    const auto channel = std::size_t(deflection_[std::size_t(i)]);
+    const std::size_t channel = deflection_[std::size_t(i)] ? 1 : 0;
     square[channel] += signal[i] * signal[i], ++count[channel];
   }
   for (Eigen::Index i = 0; i < signal.size(); ++i) {
-    const auto channel = std::size_t(deflection_[std::size_t(i)]);
+    const std::size_t channel = deflection_[std::size_t(i)] ? 1 : 0;
     weights_[i] = square[channel] > 0 ? std::sqrt(count[channel] / square[channel]) : 0;
   }
 }
@@ -271,7 +271,7 @@ Balance::Squares Balance::squares_of(const std::vector<Eigen::Index>& rows, cons
                                      const Eigen::VectorXd& factors) const {
   Squares s;
   for (const Eigen::Index i : rows) {
-    const auto channel = std::size_t(deflection_[std::size_t(i)]);
+    const std::size_t channel = deflection_[std::size_t(i)] ? 1 : 0;
     s.before[channel] += std::pow(left_[i], 2), ++s.count[channel];
     s.after[channel] += std::pow(left_[i] - columns.row(i).dot(factors), 2);
   }
