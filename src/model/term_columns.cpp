@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "backlash_diagnosis/base/error.h"
 
@@ -11,9 +10,6 @@ namespace backlash::model {
 namespace {
 
 constexpr double kProbe = 0.25;  // strength of the probes, a power of two: the division is exact
-// Of the squares of a column: with less of its own it would have to be ten times as large as what it is to
-// explain. Choice.
-constexpr double kOwn = 0.01;
 // s, times the speed: ways over which friction builds up after a reversal. Choice.
 constexpr double kBristles[] = {0.01, 0.02, 0.05, 0.1, 0.2};
 
@@ -162,43 +158,6 @@ bool has_order(const TermType& type) {
   return all.size() == 1 && all.front()->wave;
 }
 
-namespace {
-
-/// Whether dry and viscous friction of other values leave more than kOwn of the squares of its column, over
-/// motions that have all speeds, loads and positions alike.
-bool differs_from_friction(const TermColumns& term, const MotionRange& range) {
-  constexpr int kMoments = 400;
-  constexpr double kSteps[] = {0.618034, 0.754878, 0.569840};  // golden ratio and plastic number: even cover
-  double xx = 0, xv = 0, vv = 0, xy = 0, vy = 0, yy = 0;
-  for (int k = 0; k < kMoments; ++k) {
-    const auto uniform = [&](int i) { return 2 * std::fmod(k * kSteps[i], 1) - 1; };
-    JointMoment m;
-    m.speed = 2 * range.speed * uniform(0), m.direction = m.speed < 0 ? -1 : 1;
-    m.load = uniform(1), m.position = M_PI * uniform(2), m.time = k, m.way = std::fabs(uniform(2));
-    const double y = term.at(0, m), s = m.direction, v = m.speed;
-    xx += s * s, xv += s * v, vv += v * v, xy += s * y, vy += v * y, yy += y * y;
-  }
-  const double determinant = xx * vv - xv * xv;
-  const double explained = (xy * xy * vv - 2 * xy * vy * xv + vy * vy * xx) / determinant;
-  return yy - explained > kOwn * yy;
-}
-
-/// As a value of its shape leaves it, the one with most of its own.
-bool is_of_its_own(const SearchedTerm& term, const MotionRange& range) {
-  if (shown_in(*term.type) != ShownIn::torque || has_order(*term.type) || term.shapes.empty()) {
-    ParameterValues given = term.given;
-    if (const auto shape = searched_shape(*term.type)) given[shape->name] = 1;
-    return shown_in(*term.type) != ShownIn::torque || differs_from_friction({*term.type, given}, range);
-  }
-  return std::any_of(term.shapes.begin(), term.shapes.end(), [&](double value) {
-    ParameterValues given = term.given;
-    given[searched_shape(*term.type)->name] = value;
-    return differs_from_friction({*term.type, given}, range);
-  });
-}
-
-}  // namespace
-
 std::vector<SearchedTerm> searched_terms(ShownIn channel, const MotionRange& range) {
   std::vector<SearchedTerm> all;
   for (const TermType& type : term_types()) {
@@ -220,8 +179,7 @@ std::vector<SearchedTerm> searched_terms(ShownIn channel, const MotionRange& ran
         variants = std::move(more);
       }
     }
-    std::copy_if(variants.begin(), variants.end(), std::back_inserter(all),
-                 [&](const SearchedTerm& v) { return is_of_its_own(v, range); });
+    all.insert(all.end(), variants.begin(), variants.end());
   }
   return all;
 }

@@ -85,19 +85,6 @@ TEST(TermColumns, OnlyAConstantTorqueMayBeTheZeroOfASensor) {
     EXPECT_EQ(looks_like(type).empty(), type.id != "asymmetric_coulomb") << type.id;
 }
 
-TEST(TermColumns, WhatFrictionOfOtherValuesDoesIsNotSearched) {
-  // Over speeds from 0 to 1 the least squares of sqrt(x) by 4 / 15 + 4 x / 5 leave 1 / 450 of 1 / 2; of x^2
-  // by x - 1 / 6 1 / 180 of 1 / 5.
-  std::set<std::string> searched;
-  for (const SearchedTerm& term : searched_terms(ShownIn::torque, {10, 1, 0.01, -1, 1, 5, 1e-3}))
-    searched.insert(term.type->id);
-  EXPECT_EQ(searched.count("square_root_friction"), 0u);
-  for (const char* id :
-       {"quadratic_drag", "stribeck", "load_dependent_friction", "asymmetric_viscous", "presliding",
-        "gravity", "cogging", "position_dependent_friction", "asymmetric_coulomb", "friction_drift"})
-    EXPECT_EQ(searched.count(id), 1u) << id;
-}
-
 TEST(TermColumns, SearchedTermsHaveAllButStrengthPhaseAndOneShape) {
   const MotionRange range{10, 1, 0.01, -1, 1, 5, 1e-3};
   for (const ShownIn channel : {ShownIn::torque, ShownIn::deflection})

@@ -89,9 +89,8 @@ struct SearchedTerm {
   std::vector<double> shapes;
 };
 
-/// All terms that a search of that channel may try, but those with several shapes to be searched, those that
-/// are part of how a machine is built (TermSearch::needs_turning_link, TermType::gap_variation), and those
-/// that dry and viscous friction of other values do as well (0.4 % of square_root_friction is its own).
+/// All terms that a search of that channel may try, but those with several shapes to be searched and those
+/// that are part of how a machine is built (TermSearch::needs_turning_link, TermType::gap_variation).
 std::vector<SearchedTerm> searched_terms(ShownIn channel, const MotionRange& range);
 
 }  // namespace backlash::model
