@@ -96,13 +96,11 @@ EffectLaw::EffectLaw(const JointEffect& effect) {
   if (spec.type)
     term_ = columns_of(*spec.type, effect.given, effect.shape);
   else
-    drive_term_ = spec.drive_term;
+    viscous_ = spec.drive_term == kDriveTermSpecs[std::size_t(DriveTerm::viscous)].name;
 }
 
 Eigen::Vector2d EffectLaw::units(const model::JointMoment& now) const {
-  if (!term_)
-    return {drive_term_ == kDriveTermSpecs[std::size_t(DriveTerm::viscous)].name ? now.speed : now.direction,
-            0};
+  if (!term_) return {drive_unit(viscous_ ? DriveTerm::viscous : DriveTerm::coulomb, now), 0};
   return {term_->at(0, now), term_->count() > 1 ? term_->at(1, now) : 0};
 }
 

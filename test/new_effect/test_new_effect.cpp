@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/changes/changes.h"
 #include "backlash_diagnosis/identification/effects/effect_search.h"
 #include "backlash_diagnosis/identification/procedures/one_inertia.h"
+#include "identification/procedures/missing_effects.h"
 #include "new_effect/eddy_current_brake.h"
 #include "support/servo.h"
 
@@ -139,6 +140,18 @@ TEST(NewEffect, IsNamedOfAnArm) {
 }
 
 TEST(NewEffect, WidensTheErrorsOfAFitThatLacksIt) {
+  const std::vector<model::JointMoment> moments = {
+      {0, 0.1, 0.2, 1, 3}, {1, 0.2, -1, -1, 2}, {2, 0.3, 1.5, 1, 1}};
+  bool listed = false;
+  for (const identification::EffectShapes& effect : identification::likely_effects(moments))
+    for (const double share : {0.1, 0.3, 1.0}) {  // of the rms speed, as the term says
+      const double critical = share * std::sqrt((0.2 * 0.2 + 1 + 1.5 * 1.5) / 3);
+      bool same = true;
+      for (std::size_t k = 0; k < moments.size(); ++k)
+        same &= std::fabs(effect[0][k] - test::eddy_current_torque(1, critical, moments[k].speed)) < 1e-12;
+      listed |= same;
+    }
+  EXPECT_TRUE(listed);
   const Joint joint;
   const identification::OneInertia m = identification::identify_one_inertia(record_of(joint, 1, 60));
   EXPECT_LT(std::fabs(m.coulomb.value - joint.coulomb), 3 * m.coulomb.standard_error);

@@ -61,7 +61,7 @@ class EffectLaw {
   Eigen::Vector2d units(const model::JointMoment& now) const;
 
  private:
-  std::string drive_term_;  // of an effect that no term is
+  bool viscous_ = false;  // of an effect that no term is; else dry friction
   std::optional<model::TermColumns> term_;
 };
 

@@ -15,8 +15,7 @@ constexpr double kComparable = 2;  // choice: times the squares that the best ef
 constexpr int kMostEffects = 4;    // choice: in one machine
 constexpr double kDrawn = 0.1;     // simulation: share of what is left that follows a column
 // Choice: of the squares of an effect, what the equation cannot do by itself. One with less would have to be
-// more than ten
-// times as large as what is left of the torque.
+// ten times as large as what is left of the torque.
 constexpr double kOwn = 0.01;
 
 Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
