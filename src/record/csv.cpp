@@ -39,11 +39,6 @@ bool has_required_channel(const std::vector<Channel>& channels) {
   });
 }
 
-/// As most programs write what was not measured; an infinity is a number that went wrong.
-bool is_no_number(std::string_view text) {
-  return text == "nan" || text == "NaN" || text == "NAN" || text == "-nan";
-}
-
 class Reader {
  public:
   Reader(std::istream& in, const std::string& name, bool linear)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "csv_lines.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cstring>
 #include <istream>
 
@@ -54,6 +56,15 @@ bool LineReader::refill() {
 
 std::string in_quotes(std::string_view text) {
   return "'" + printable(text) + "'";
+}
+
+bool is_no_number(std::string_view text) {
+  if (text.empty()) return true;
+  if (text.front() == '-' || text.front() == '+') text.remove_prefix(1);
+  if (text.size() > 8) return false;
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
+  return lower == "nan" || lower == "inf" || lower == "infinity" || lower == "null";
 }
 
 void split(std::string_view line, char separator, std::vector<std::string_view>& fields) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 
@@ -19,15 +18,6 @@ constexpr std::size_t kNamesInMessage = 40;
 std::string_view bare_unit(std::string_view text) {
   const Label label = label_of(text);
   return label.has_unit && label.name.empty() ? label.unit : text;
-}
-
-/// What a logger writes where it has no number.
-bool is_no_number(std::string_view text) {
-  if (!text.empty() && (text.front() == '-' || text.front() == '+')) text.remove_prefix(1);
-  if (text.size() > 8) return false;
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
-  return lower == "nan" || lower == "inf" || lower == "infinity" || lower == "null";
 }
 
 /// The place that a number as the name of a column says, from 0.
@@ -212,7 +202,6 @@ double MappedRows::read_field(const MappedColumn& column, const std::string& fie
   const auto fail = [&](const std::string& reason) {
     place.fail(printable(column.name) + " = " + in_quotes(field) + ": " + reason);
   };
-  if (field.empty()) fail("empty");
   const std::string text = mark_.with_point(field, column.name, place);
   const ParsedNumber number = is_time(column) ? clock_->read(text) : parse_number(text);
   if (!number)

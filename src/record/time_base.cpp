@@ -36,7 +36,7 @@ std::string time_text(double time) {
 StampVerdict StampChecker::next(double stamp) {
   if (!std::isfinite(stamp)) throw InvalidParameter("time", stamp, "must be finite");
   if (accepted_ > 0 && stamp <= last_) {
-    if (stamp < last_ && !(last_ - stamp < std::min(intervals_[0], intervals_[1])))
+    if (stamp < last_ && !(last_ - stamp < kGapFactor * std::min(intervals_[0], intervals_[1])))
       return StampVerdict::backwards;
     if (repeated_++ == 0) first_repeated_ = stamp;
     return StampVerdict::repeated;

@@ -6,8 +6,9 @@ from case import BAD, CANNOT_TELL, Case, RIGHT
 from clean import judge_diagnosis
 
 SEPARATORS = [";", "\t", " ", "|", ":"]
-NO_NUMBERS = ["abc", "0.05 N m", "1e", "0x1F", "--1", "12abc", "1.2.3", "", "'0.05'", "null", "1 2", "٣"]
-NO_FINITE = ["inf", "-Inf", "1e999", "-1e400"]
+NO_NUMBERS = ["abc", "0.05 N m", "1e", "0x1F", "--1", "12abc", "1.2.3", "'0.05'", "1 2", "٣"]
+TOO_LARGE = ["1e999", "-1e400"]
+NOT_MEASURED = ["", "nan", "inf", "-Inf", "null"]
 
 
 def text_of(header, rows):
@@ -85,8 +86,15 @@ def text_in_numbers(rng, clean):
     return with_field(rng, clean, NO_NUMBERS)
 
 
-def not_finite(rng, clean):
-    return with_field(rng, clean, NO_FINITE)
+def too_large(rng, clean):
+    return with_field(rng, clean, TOO_LARGE)
+
+
+def not_measured(rng, clean):
+    """A row counts without the value, but not without its time."""
+    what, body, _, parts = with_field(rng, clean, NOT_MEASURED)
+    of_time = parts[1] == "time"
+    return what, body, of_time, parts if of_time else []
 
 
 def huge_line(rng, clean):
@@ -132,7 +140,8 @@ def unordered_times(rng, clean):
         rows.reverse()
     else:
         rows = rows + rows
-    return how, text_of(header, rows).encode(), True, [r"record\.csv:\d+", "time = "]
+    refused = how != "swapped rows"  # of those one comes late
+    return how, text_of(header, rows).encode(), refused, [r"record\.csv:\d+", "time = "] if refused else []
 
 
 def repeated_times(rng, clean):
@@ -216,7 +225,7 @@ def dead_channel(rng, clean):
 
 
 GENERATORS = [wrong_separator, decimal_comma, missing_column, wrong_column_name, swapped_columns,
-              fields_missing_or_extra, text_in_numbers, not_finite, huge_line, harmless_layout, cr_only,
+              fields_missing_or_extra, text_in_numbers, too_large, not_measured, huge_line, harmless_layout, cr_only,
               unordered_times, repeated_times, missing_rows, few_rows, no_data, binary, truncated, bits_flipped,
               outliers, wrong_unit, dead_channel]
 ANSWERED = {harmless_layout, repeated_times}  # nothing is lost: the answer is the clean one

@@ -35,17 +35,19 @@ TEST(StampChecker, AcceptsLaterStampsDropsRepeatedOnesAndRefusesEarlierOnes) {
   EXPECT_EQ(stamps.first_repeated(), -5);
 }
 
-// One that jitters goes back by less than an interval; one after a pause may have gone back by less than
-// that.
-TEST(StampChecker, AStampThatGoesBackByLessThanAnIntervalLosesItsSample) {
+// One that jitters goes back by less than an interval, one that comes late by some, and one of another clock
+// by more than a gap is long: ten of the shorter of the two intervals before it.
+TEST(StampChecker, AStampThatGoesBackByLessThanAGapLosesItsSample) {
   StampChecker stamps;
   for (const double stamp : {0.0, 1.0, 2.0}) EXPECT_EQ(stamps.next(stamp), StampVerdict::accept);
   EXPECT_EQ(stamps.next(1.9), StampVerdict::repeated);
-  EXPECT_EQ(stamps.next(1), StampVerdict::backwards);
+  EXPECT_EQ(stamps.next(1), StampVerdict::repeated);
+  EXPECT_EQ(stamps.next(-8), StampVerdict::backwards);
   EXPECT_EQ(stamps.next(3), StampVerdict::accept);
   EXPECT_EQ(stamps.next(100), StampVerdict::accept);
-  EXPECT_EQ(stamps.next(50), StampVerdict::backwards);
-  EXPECT_EQ(stamps.repeated(), 1u);
+  EXPECT_EQ(stamps.next(90.5), StampVerdict::repeated);
+  EXPECT_EQ(stamps.next(90), StampVerdict::backwards);
+  EXPECT_EQ(stamps.repeated(), 3u);
 }
 
 TEST(StampChecker, TheFirstStampMayBeZero) {

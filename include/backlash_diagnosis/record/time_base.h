@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What is allowed in a time base, and what is said about it. One policy for CSV, bags and live topics: a
-// stamp that goes back by an interval is refused, one that repeats or goes back by less loses the later
-// sample, gaps and jitter are kept and reported.
+// stamp that goes back by more than a gap is long is refused, one that repeats or goes back by less loses the
+// later sample, gaps and jitter are kept and reported.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@ class Record;
 
 enum class StampVerdict {
   accept,     ///< later than the stamp accepted before, or the first
-  repeated,   ///< equal to it, or earlier by less than the two intervals before it (a stamp that jitters):
-              ///< drop this sample
+  repeated,   ///< equal to it, or earlier by less than kGapFactor of the intervals before it (a stamp that
+              ///< jitters, a message that came late): drop this sample
   backwards,  ///< earlier by more: the data are out of order or the clock jumped
 };
 
