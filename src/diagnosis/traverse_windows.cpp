@@ -64,6 +64,10 @@ fit::Priors shared_priors(const TraverseData& data, const GapTraverseSettings& s
   p[kTraverseCosine] = {"cosine of the load encoder's angle", 0, kEccentricity, false};
   // Of the motion of the load only ratios to its inertia are seen, and of the motor nothing.
   const bool by_load = !data.load.empty();
+  for (const int ratio : {kTraverseStiffness, kTraverseDamping, kTraverseLoadFriction, kTraverseLoadDamping,
+                          kTraverseLoadTerms})
+    if (fit::Prior& prior = p[std::size_t(ratio)]; by_load && prior.factor && prior.spread > 0)
+      prior.spread = std::hypot(prior.spread, kKnownInertia);
   for (const int unseen : {kTraverseLoadInertia, kTraverseMotorInertia, kTraverseMotorDamping,
                            kTraverseMotorFriction, kTraverseLate})
     if (by_load) p[std::size_t(unseen)].spread = 0;
