@@ -36,7 +36,6 @@ std::string objection(const Gain& gain, const Machine& after, const RecordSet& r
   if (!(e.gain_held_out >= least)) return too_little("in blocks left out of the fit", e.gain_held_out, least);
   if (!(e.gain_forward >= a.earlier_gain * least))
     return too_little("in the later part, fitted to the earlier,", e.gain_forward, a.earlier_gain * least);
-  if (!(gain.total > 0)) return "makes both channels together no better in blocks left out of the fit";
   if (e.blocks_better < a.most_blocks * e.blocks)
     return fmt::format("makes only {} of {} blocks left out of the fit better", e.blocks_better, e.blocks);
   return "";

@@ -69,7 +69,7 @@ Hypothesis add_learned(const Hypothesis& named, const SearchContext& context) {
   const std::size_t count = h.effects.size();
   h = add_map(h, context);  // one: a machine that is described by several tables is not understood
   const bool helped = h.effects.size() > count;
-  if (helped) h = drop_superfluous(add_effects(h, context), context);
+  if (helped) h = add_effects(h, context);
   if (helped && size(h) < (1 - settings.asked.least_gain_unclear) * size(named)) return h;
   Hypothesis rest = named;
   rest.rejected = h.rejected;

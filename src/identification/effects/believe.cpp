@@ -10,7 +10,6 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "effect_roles.h"
 #include "found_effects.h"
-#include "local_strength.h"
 #include "steps.h"
 #include "strength_in_parts.h"
 #include "unseen_gain.h"
@@ -39,10 +38,6 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
   if (decrease < (map ? settings.least_part_of_map : settings.least_part) * above)
     return fmt::format("on the unseen record it explains {:.2g} % of what {} has above the noise: too little",
                        100 * decrease / above, name);
-  if (is.total() < settings.below_noise * is.noise)
-    return fmt::format(
-        "on the unseen record it leaves {:.2g} times of {} what noise does: it explains the noise",
-        std::sqrt(is.total() / is.noise), name);
   if (before.deflection.empty()) return "";
   const Left other_was = left(before, !deflection, settings), other_is = left(after, !deflection, settings);
   const TestGain other = test_gain(other_was, other_is, settings);
@@ -84,20 +79,6 @@ bool is_vague(const std::vector<signal::Measured>& strengths, double least) {
   });
 }
 
-/// Why the effect is not itself where it acts most; empty: it is.
-std::string weak_where_it_acts(const Hypothesis& h, std::size_t effect,
-                               const std::vector<signal::Measured>& strengths,
-                               const BeliefSettings& settings) {
-  if (strengths.size() != 1) return "";
-  const auto local = local_strength(h, effect, strengths.front());
-  if (!local || local->standard_error > settings.local_error ||
-      local->ratio + settings.sure * local->standard_error > settings.least_local)
-    return "";
-  return fmt::format(
-      "where it acts most it has {:.2g} +- {:.1g} of its strength: it stands in for something else",
-      local->ratio, local->standard_error);
-}
-
 /// Why the effect is not itself in some part of the motion; empty: it is.
 std::string other_in_a_part(const StrengthInParts& parts, std::size_t effect) {
   const auto part = parts.differing(effect);
@@ -121,9 +102,6 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (!belongs_to_machine(i) && is_vague(all[i], settings.least_z))
       return std::pair{i, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};
-  for (std::size_t i = 0; i < h.effects.size(); ++i)
-    if (std::string why = weak_where_it_acts(h, i, all[i], settings); !belongs_to_machine(i) && !why.empty())
-      return std::pair{i, std::move(why)};
   const StrengthInParts parts(h, unseen, context);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (std::string why = other_in_a_part(parts, i); !belongs_to_machine(i) && !why.empty())

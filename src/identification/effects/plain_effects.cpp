@@ -71,12 +71,6 @@ std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& co
   std::stable_sort(all.begin(), tied, [](const Plain& a, const Plain& b) {
     return unknowns(a.candidate) < unknowns(b.candidate);
   });
-  // What every machine has is no effect of another name.
-  const auto as_good = nearly(settings.revision.as_good);
-  const auto usual = std::find_if(all.begin(), all.end(), [&](const Plain& p) {
-    return is_usual(p.candidate, h.declared->rig) && as_good(p);
-  });
-  if (usual != all.end()) std::rotate(all.begin(), usual, usual + 1);
   return all;
 }
 

@@ -65,32 +65,18 @@ Hypothesis believe_all(const Hypothesis& before, const Hypothesis& declared, con
 }
 
 /// What two encoders show plainly, one effect after the other, as long as the unseen record bears all of them
-/// out: one that is not there would spoil those before it. Or no more than every machine has. Adds why others
-/// were rejected.
+/// out: one that is not there would spoil those before it. Adds why others were rejected.
 std::optional<Hypothesis> plain_effects(Hypothesis& declared, const ServoData& unseen,
                                         const SearchContext& context) {
-  const auto named = [](const Hypothesis& h) {
-    return std::any_of(h.effects.begin(), h.effects.end(),
-                       [&](const Effect& effect) { return !is_usual(effect.candidate, h.declared->rig); });
-  };
   std::optional<Hypothesis> found;
   for (Hypothesis h = declared; h.effects.size() < context.settings.asked.most_effects;) {
     const Hypothesis more = add_plain_effect(h, context);
     if (more.effects.size() == h.effects.size()) break;
     h = more;
-    const Hypothesis whole = add_shape_of_friction(h, context);
-    if (!named(whole)) {
-      found = whole;
-      continue;
-    }
-    const Hypothesis believed = believe_all(whole, declared, unseen, context);
+    const Hypothesis believed = believe_all(h, declared, unseen, context);
     declared.rejected = believed.rejected;
-    const bool all = believed.effects.size() == whole.effects.size();
-    if (!all && found && named(*found)) return found;
-    if (named(believed))
-      found = believed;
-    else
-      found.reset();
+    if (found && believed.effects.size() < h.effects.size()) return found;
+    if (!believed.effects.empty()) found = believed;
   }
   return found;
 }
@@ -118,9 +104,6 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
     return result;
   }
   Hypothesis h = add_effects_or_teeth(result.declared, context);
-  h = drop_superfluous(h, context);
-  h = reconsider(h, context);
-  h = try_equivalents(h, context);
   h = add_learned(h, context);
   h = drop_stand_ins(h, context);
   result.found = believe_all(h, result.declared, unseen, context);

@@ -75,19 +75,13 @@ struct BeliefSettings {
   double risk = 0.05;              // choice: beyond both ends of an interval
   double least_part = 0.1;         // choice: of what lies above the noise, that an effect must explain
   double least_part_of_map = 0.5;  // choice: the same, of a map, which can take any shape
-  double below_noise =
-      0.64;             // theory: of the noise's square, its deviation known to a fifth: nothing leaves less
-  double worse = 0.05;  // choice: of the other channel's error
+  double worse = 0.05;             // choice: of the other channel's error
   // A channel that is left with little but noise may get worse by a part of what the other gains, each in its
   // noise: the fit weighs both.
   double at_noise = 1.3;     // simulation: times the noise
   double price = 0.1;        // choice
   double much_worse = 0.15;  // choice: of the other channel's error, at no price
   double least_z = 4;        // choice: of a strength, standard errors
-  double least_local = 0.5;  // choice: of a strength, where the effect acts most: less is another effect
-  double local_error =
-      0.1;          // choice: of a strength; where it is known less well the rest of the record counts
-  double sure = 2;  // theory: standard errors, 95 %
   // Where more is left than so many times the noise: of a strength, in a part of the records that holds this
   // share of what the effect does, and shows it within this error: as far off, by so many standard errors, is
   // another effect. Choices.

@@ -16,8 +16,6 @@ std::vector<FitParameter> declared_parameters(const model::Rig& rig);
 /// Of a term that every machine has some of, the largest strength that is usual (model/term.h); 0: none is.
 double usual_strength(const model::TermType& type, const model::Rig& rig);
 bool is_usual(const Candidate& candidate, const model::Rig& rig);
-/// How friction builds up after a reversal, where that is usual and lessens what is left.
-Hypothesis add_shape_of_friction(const Hypothesis& h, const SearchContext& context);
 
 /// One more named effect, that which two encoders show plainly to explain most; none of a machine with one.
 Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context);
@@ -40,15 +38,6 @@ Hypothesis with_best_shapes(const Hypothesis& h, const SearchContext& context);
 
 /// Without one effect; those that came after it are fitted again, one by one.
 Hypothesis without_effect(const Hypothesis& h, std::size_t effect, const SearchContext& context);
-
-/// Without the effects that the others explain as well.
-Hypothesis drop_superfluous(const Hypothesis& h, const SearchContext& context);
-
-/// An early effect may have stood in for a later one: where much is left, sets without it are tried.
-Hypothesis reconsider(const Hypothesis& h, const SearchContext& context);
-
-/// What explains the same alone may explain more, or the same with fewer parameters, beside the others.
-Hypothesis try_equivalents(const Hypothesis& h, const SearchContext& context);
 
 /// One learned map, of those that explain most.
 Hypothesis add_map(const Hypothesis& h, const SearchContext& context);

@@ -14,7 +14,7 @@
 namespace backlash::identification {
 namespace {
 
-using Points = std::vector<ResponsePoint>;
+using ResponsePoints = std::vector<ResponsePoint>;
 
 constexpr double kWindow = 2;                 // choice: of |H|^2, around an extremum
 constexpr std::size_t kBeside = 3;            // choice: points on either side of an extremum
@@ -22,7 +22,8 @@ constexpr double kLeastError = 1e-3;          // choice: relative, of any point
 constexpr double kBelow = 0.5, kAbove = 1.5;  // theory: of F_AR and F_R: bands of the plateaus
 
 /// Median of a value over five neighbours: a single bad point makes no extremum.
-std::vector<double> smoothed(const Points& points, const std::function<double(const ResponsePoint&)>& value) {
+std::vector<double> smoothed(const ResponsePoints& points,
+                             const std::function<double(const ResponsePoint&)>& value) {
   std::vector<double> out;
   const std::size_t n = points.size();
   for (std::size_t i = 0; i < n; ++i) {
@@ -36,7 +37,7 @@ std::vector<double> smoothed(const Points& points, const std::function<double(co
 
 /// Minimum of |H|^2 (power 1) or 1/|H|^2 (power -1) near point `at`: vertex of the cubic c0 .. c3 in
 /// x = (f - f_at) / half width, from c1 + 2 c2 x + 3 c3 x^2 = 0.
-signal::Measured vertex(const Points& points, std::size_t at, int power, double variance_factor,
+signal::Measured vertex(const ResponsePoints& points, std::size_t at, int power, double variance_factor,
                         const char* what) {
   const auto value = [&](std::size_t i) { return std::pow(std::norm(points[i].response), power); };
   std::size_t first = at, last = at;
@@ -106,7 +107,7 @@ signal::Measured checked_plateau(const FrequencyResponse& motor, double from, do
 }  // namespace
 
 Resonances find_resonances(const FrequencyResponse& motor) {
-  const Points& points = motor.points;
+  const ResponsePoints& points = motor.points;
   if (points.size() < 4 * kBeside)
     throw CannotIdentify("only " + std::to_string(points.size()) +
                          " points of the response: no resonance can be found: run at more frequencies");

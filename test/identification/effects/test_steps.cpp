@@ -9,7 +9,6 @@
 #include "identification/effects/contact_shape.h"
 #include "identification/effects/found_effects.h"
 #include "identification/effects/learned.h"
-#include "identification/effects/local_strength.h"
 #include "identification/effects/search.h"
 #include "identification/effects/steps.h"
 #include "identification/effects/strength_in_parts.h"
@@ -116,16 +115,6 @@ TEST(AddEffect, NoMoreThanAskedFor) {
       add_effects(fit_declared(test::one_inertia_rig(), bench.context), bench.context).effects.empty());
 }
 
-TEST(DropSuperfluous, TakesOutWhatTheOthersExplain) {
-  const SearchBench bench{with_cogging()};
-  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
-  const auto both = refitted(h, {drag_effect(0.05), cogging_effect(0.8, 7, 0.6)}, bench.context);
-  ASSERT_TRUE(both);
-  const Hypothesis kept = drop_superfluous(*both, bench.context);
-  EXPECT_EQ(ids(kept), std::vector<std::string>{"cogging"});
-  EXPECT_EQ(reason(kept, "quadratic_drag"), "the other effects explain the same");
-}
-
 TEST(WithoutEffect, LeavesTheOthersFitted) {
   const SearchBench bench{with_cogging()};
   const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
@@ -135,48 +124,6 @@ TEST(WithoutEffect, LeavesTheOthersFitted) {
   EXPECT_LT(size(without_effect(*both, 0, bench.context)), 1.3);
   EXPECT_EQ(ids(without_effect(*both, 1, bench.context)), std::vector<std::string>{"quadratic_drag"});
   EXPECT_GT(size(without_effect(*both, 1, bench.context)), 2);
-}
-
-// The first effect was taken for what two others are together.
-TEST(Reconsider, FindsTheSetWithoutTheStandIn) {
-  OneInertiaMachine machine;
-  machine.extra = [](double q, double) { return 0.8 * std::sin(7 * q + 0.6) + 0.8 * std::sin(9 * q + 0.2); };
-  SearchBench bench{machine};
-  bench.context.settings.asked.most_effects = 2;
-  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
-  const auto wrong = refitted(h, {drag_effect(0.1), cogging_effect(0.8, 7, 0.6)}, bench.context);
-  ASSERT_TRUE(wrong);
-  const Hypothesis right = reconsider(*wrong, bench.context);
-  EXPECT_EQ(ids(right), (std::vector<std::string>{"cogging", "cogging"}));
-  EXPECT_LT(size(right), 1.3);
-  EXPECT_NE(reason(right, "quadratic_drag").find("stood in"), std::string::npos);
-}
-
-TEST(Reconsider, LeavesAloneWhatIsClearlyRight) {
-  const SearchBench bench{with_cogging()};
-  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
-  const auto both = refitted(h, {drag_effect(0.05), cogging_effect(0.8, 7, 0.6)}, bench.context);
-  ASSERT_TRUE(both);
-  EXPECT_EQ(reconsider(*both, bench.context).fitted, both->fitted);
-}
-
-TEST(TryEquivalents, TakesTheAlternativeThatExplainsMore) {
-  const SearchBench bench{with_cogging()};
-  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
-  Effect wrong = drag_effect(0.05);
-  wrong.alternatives = {cogging_effect(0.8, 7, 0.6).candidate};
-  const auto start = refitted(h, {wrong}, bench.context);
-  ASSERT_TRUE(start);
-  const Hypothesis swapped = try_equivalents(*start, bench.context);
-  EXPECT_EQ(ids(swapped), std::vector<std::string>{"cogging"});
-  ASSERT_EQ(swapped.effects[0].alternatives.size(), 1u);
-  EXPECT_EQ(swapped.effects[0].alternatives[0].id, "quadratic_drag");
-
-  Effect right = cogging_effect(0.8, 7, 0.6);
-  right.alternatives = {drag_effect(0.05).candidate};
-  const auto good = refitted(h, {right}, bench.context);
-  ASSERT_TRUE(good);
-  EXPECT_EQ(ids(try_equivalents(*good, bench.context)), std::vector<std::string>{"cogging"});
 }
 
 TEST(OtherTeeth, AreAsStiffAndDampedUnderTheSameTorque) {
@@ -263,29 +210,6 @@ TEST(DropStandIns, OfTwoInertiasWhatLeavesMoreThanItExplains) {
   EXPECT_EQ(drop_stand_ins(that_leaves(2.2, 1.9, servo, bench), bench.context).effects.size(), 1u);
   EXPECT_EQ(drop_stand_ins(that_leaves(20, 15, test::one_inertia_rig(), bench), bench.context).effects.size(),
             1u);
-}
-
-/// Strength of a Stribeck friction that is fitted to this machine, where it acts most.
-LocalStrength of_stribeck(const OneInertiaMachine& machine) {
-  const SearchBench bench{machine};
-  Effect stribeck;
-  stribeck.candidate = {"stribeck", {{{"torque", 0.5}, {"speed", 0.5}, {"exponent", 2}}}};
-  stribeck.candidate.terms[0].set_choice("body", "motor");
-  const auto with = refitted(fit_declared(test::one_inertia_rig(), bench.context), {stribeck}, bench.context);
-  const signal::Measured strength =
-      fitted_values(*with->fitted, with->declared->parameters.size()).effects.at(0);
-  return local_strength(with.value(), 0, strength).value();
-}
-
-// A friction that rises faster from 1 rad/s on bends as if it fell at low speeds. Three standard errors.
-TEST(LocalStrength, OfAnEffectIsItsStrengthAndOfAStandInIsNot) {
-  OneInertiaMachine falls, rises;
-  falls.extra = [](double, double w) { return std::copysign(1.5 * std::exp(-w * w / 0.25), w); };
-  rises.extra = [](double, double w) { return std::copysign(2 * std::max(0.0, std::fabs(w) - 1), w); };
-  const LocalStrength right = of_stribeck(falls), wrong = of_stribeck(rises);
-  EXPECT_NEAR(right.ratio, 1, 3 * right.standard_error);
-  EXPECT_LT(right.standard_error, 0.1);
-  EXPECT_LT(wrong.ratio + 3 * wrong.standard_error, 0.5);
 }
 
 /// The part of the records, of machines of these two, in which a cogging fitted to the first differs most.
