@@ -100,9 +100,13 @@ double left_of(const TraverseFit& fit, const TraverseData& data) {
 }
 
 /// A flank that is never pressed may be anywhere: each must be, whatever the declared torque on the load is
-/// within twice what is known of it, and without the torque that nothing explains.
+/// within two standard errors, and without the torque that nothing explains.
 void require_both_flanks(const TraverseFit& fit, const TraverseData& data) {
   const fit::Prior& terms = fit.windows->shared()[kTraverseLoadTerms];
+  const double found = fit.fit.shared[kTraverseLoadTerms],
+               error = std::sqrt(
+                   std::max(fit.fit.covariance()(kTraverseLoadTerms, kTraverseLoadTerms),
+                            fit.fit.clustered_covariance()(kTraverseLoadTerms, kTraverseLoadTerms)));
   int forward = 0, backward = 0;
   for (int w = 0; w < fit.windows->count(); ++w) {
     const Eigen::VectorXd& own = fit.fit.own[std::size_t(w)];
@@ -111,7 +115,7 @@ void require_both_flanks(const TraverseFit& fit, const TraverseData& data) {
     const double most = signal::quantile(torque, 1 - kLong), least = signal::quantile(torque, kLong);
     const double unexplained = fit.windows->own()[kOwnLoadTorque].value(own[kOwnLoadTorque]);
     double highest = kNaN, lowest = kNaN;  // of the torque that presses for sure
-    for (const double z : {-2.0, 2.0}) {
+    for (const double z : {found - 2 * error, found + 2 * error}) {
       const double other =
           (terms.value(z) - fit.fit.value(kTraverseLoadTerms)) * fit.windows->load_torque(w) - unexplained;
       highest = std::fmin(highest, most + other), lowest = std::fmax(lowest, least + other);

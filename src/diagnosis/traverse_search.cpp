@@ -15,8 +15,8 @@ namespace {
 // Choices, tried on joints of test/campaigns/robot_joints and tests, but where another origin is given.
 constexpr int kSearched = 16;  // windows of a first guess
 constexpr int kSearch = 20;    // steps of one
-constexpr double kBounces[] = {-1.5, 0,
-                               1.5};  // spreads of the damping: bouncing or not decides where fits end
+// Spreads: whether the load bounces, and whether its weight keeps it on one flank, decides where fits end.
+constexpr double kBounces[] = {-1.5, 0, 1.5}, kMoreWeight = 1.5;
 // Theory: of a cost of some thousand, a hundredth of a standard error.
 constexpr double kConverged = 1e-7;
 constexpr double kBeside[] = {0.7, 1.4};  // times the gap of a fit, from which others begin
@@ -103,17 +103,20 @@ std::vector<TraverseWindow> spread_evenly(const std::vector<TraverseWindow>& all
 Fits traverse_guesses(const TraverseData& data, const GapTraverseSettings& settings,
                       const std::vector<TraverseWindow>& windows, const Eigen::VectorXd& from,
                       const std::vector<double>& gaps, double noise) {
-  std::vector<double> dampings = {0};
+  std::vector<double> dampings = {0}, terms = {0};
   if (!data.load.empty()) dampings.assign(std::begin(kBounces), std::end(kBounces));
+  if (settings.load_torque) terms.push_back(kMoreWeight);
   const std::vector<TraverseWindow> few = spread_evenly(windows, kSearched);
   Fits fits;
   for (const double gap : gaps)
-    for (const double damping : dampings) {
-      fits.emplace_back(data, settings, few, from, noise);
-      const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
-      fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
-      fits.back().fit.shared[kTraverseDamping] += damping;
-    }
+    for (const double damping : dampings)
+      for (const double term : terms) {
+        fits.emplace_back(data, settings, few, from, noise);
+        const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
+        fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
+        fits.back().fit.shared[kTraverseDamping] += damping;
+        fits.back().fit.shared[kTraverseLoadTerms] += term;
+      }
   return run_some(std::move(fits));
 }
 

@@ -30,10 +30,11 @@
 //
 // Teeth touch and leave within a step of the integration, at the moment that it finds: damped teeth push at
 // once, and steps across that make a cost with as many minima as there are touches. Fits begin with several
-// gaps, and with others about the cheapest one's.
+// gaps, of loads that bounce and that do not, of declared torques on the load as large as known and larger
+// (which keep one flank pressed), and with other gaps about the cheapest one's.
 //
 // An answer passes five gates: both flanks are pressed, whatever the declared torque of the load is within
-// twice what is known of it; the motor alone: more than a third of all crossings lie in windows, since the
+// two standard errors; the motor alone: more than a third of all crossings lie in windows, since the
 // quick ones alone show a smaller play; stiffness and inertias are within four spreads of the declared ones;
 // a third of the channel at most is left beyond noise; the interval is narrower than a factor of four.
 //
