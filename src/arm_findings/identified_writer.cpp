@@ -89,14 +89,13 @@ arm::BodyParameters IdentifiedWriter::with_the_files_own(std::size_t i, const Fi
     now[Eigen::Index(k)] = before[Eigen::Index(k)];
   }
   if (free.empty()) return in_frame(identified, file.rig_frame);
-  const std::string what = file.name + ": " + joined(free) + ": no motion shows it";
   const arm::BodyParameters result = in_frame(now, file.rig_frame);
   if (in_file[0] > 0 && arm::is_consistent(now) && arm::is_consistent(result - file.carried)) {
-    out_.kept.push_back(what);
+    out_.kept.push_back(file.name + ": " + joined(free) + ": no motion shows it");
     return result;
   }
-  out_.unsaid.push_back(what +
-                        ", and with the file's value there is no physical body: it is that of the rig file");
+  out_.written.push_back(file.name + ": " + joined(free) +
+                         " of the rig file: no motion shows it, but with this file's no body has the rest");
   return in_frame(identified, file.rig_frame);
 }
 

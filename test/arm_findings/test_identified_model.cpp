@@ -84,19 +84,19 @@ TEST_F(IdentifiedUrdfFile, HasTheIdentifiedChainAndNothingElseIsTouched) {
     EXPECT_LT((chain.links[i] - expected).norm(), 1e-7) << i;  // printed with 8 digits
   }
   for (const char* kept :
-       {"<!-- a comment with a > and a <tag> -->", "<link name=\"upper\" ><!-- kept -->", "<!-- from CAD -->",
-        "rpy=\"0 0 0.5\"  xyz = \"0.225 0.015 0.03\"", "<mass value='2.0' />",
-        "<visual><geometry><box size=\"1 1 1\"/></geometry></visual>",
-        "friction=\"1.5\" damping=\"0.25\"/>   <!-- guessed -->",
-        "<link name=\"tool\"><inertial><mass value=\"0.5\"/>",
-        "<dynamics damping=\"0.125\" friction=\"0.5\"/>", "<!-- play: 0.002 rad, wall to wall -->"})
+       {"<!-- a comment with a > and a <tag> -->", R"(<link name="upper" ><!-- kept -->)",
+        "<!-- from CAD -->", R"(rpy="0 0 0.5"  xyz = "0.225 0.015 0.03")", "<mass value='2.0' />",
+        R"(<visual><geometry><box size="1 1 1"/></geometry></visual>)",
+        R"(friction="1.5" damping="0.25"/>   <!-- guessed -->)",
+        R"(<link name="tool"><inertial><mass value="0.5"/>)", R"(<dynamics damping="0.125" friction="0.5"/>)",
+        "<!-- play: 0.002 rad, wall to wall -->"})
     EXPECT_NE(out.text.find(kept), std::string::npos) << kept << "\n" << out.text;
   ASSERT_EQ(out.kept.size(), 1u);
   EXPECT_EQ(out.kept[0], "upper: mass: no motion shows it");
   ASSERT_EQ(out.unsaid.size(), 1u);
   EXPECT_EQ(out.unsaid[0], "shoulder: offset 0.1 N m");
   // Written again it is the same.
-  EXPECT_EQ(identified_urdf(out.text, "two.urdf", arm_).text.find("damping=\"0.25\" damping"),
+  EXPECT_EQ(identified_urdf(out.text, "two.urdf", arm_).text.find(R"(damping="0.25" damping)"),
             std::string::npos);
 }
 
@@ -110,6 +110,15 @@ TEST_F(IdentifiedUrdfFile, WhatIsNotIdentifiedKeepsItsText) {
   EXPECT_EQ(out.kept.size(), 2u);
 }
 
+TEST_F(IdentifiedUrdfFile, AMassThatNoBodyHasBesideTheRestIsThatOfTheRigFile) {
+  const std::string light =
+      std::regex_replace(std::string(kRobot), std::regex("mass value='2.0'"), "mass value='0.1'");
+  const IdentifiedModel out = identified_urdf(light, "two.urdf", arm_);
+  EXPECT_NE(out.text.find("<mass value='3' />"), std::string::npos) << out.text;
+  EXPECT_EQ(out.written[0],
+            "upper: mass of the rig file: no motion shows it, but with this file's no body has the rest");
+}
+
 TEST_F(IdentifiedUrdfFile, AnotherRobotAndNoXmlAreRefused) {
   const std::string longer = std::regex_replace(std::string(kRobot), std::regex("0.4 0 0"), "0.5 0 0");
   EXPECT_THROW(identified_urdf(longer, "x.urdf", arm_), BadData);
@@ -119,7 +128,7 @@ TEST_F(IdentifiedUrdfFile, AnotherRobotAndNoXmlAreRefused) {
 TEST_F(IdentifiedUrdfFile, ABodyThatIsLighterThanWhatIsFixedToItKeepsItsValues) {
   arm_.rig.chain.links[1] *= 0.2;
   const IdentifiedModel out = identified_urdf(kRobot, "two.urdf", arm_);
-  EXPECT_NE(out.text.find("<link name=\"lower\"/>"), std::string::npos);
+  EXPECT_NE(out.text.find(R"(<link name="lower"/>)"), std::string::npos);
   EXPECT_NE(out.kept.back().find("lower: what is fixed to it weighs 0.5 kg"), std::string::npos)
       << out.kept.back();
 }
@@ -155,29 +164,28 @@ const char* const kMujoco = R"(<mujoco model="two">
 
 TEST_F(IdentifiedUrdfFile, OfMujocoHasTheValuesAndNothingElseIsTouched) {
   const IdentifiedModel out = identified_mjcf(kMujoco, "two.xml", arm_);
-  const std::string inertial = "<inertial pos=\"0.225 0.015 0.03\" mass='2.0' fullinertia=\"";
   for (const std::string& kept :
-       {std::string("name=\"shoulder\" axis=\"0 2 0\" ref=\"30\" damping=\"0.25\" frictionloss=\"1.5\"/>"),
-        std::string("class=\"main\" axis=\"0 1 0\" damping=\"0.125\" frictionloss=\"0.5\"/>"),
-        std::string("\"/><!-- kept -->")})
+       {std::string(R"(name="shoulder" axis="0 2 0" ref="30" damping="0.25" frictionloss="1.5"/>)"),
+        std::string(R"(class="main" axis="0 1 0" damping="0.125" frictionloss="0.5"/>)"),
+        std::string(R"(<inertial pos="0.225 0.015 0.03" mass='2.0' fullinertia=")"),
+        std::string(R"("/><!-- kept -->)")})
     EXPECT_NE(out.text.find(kept), std::string::npos) << kept << "\n" << out.text;
   // Without what was written, it is the file as it was.
   std::string rest = out.text;
   for (const char* written :
-       {" damping=\"0.25\" frictionloss=\"1.5\"", " frictionloss=\"0.5\"(?=/>\\s*<)",
-        " fullinertia=\"[^\"]*\"(?=/><!-- kept)", "\\s*<inertial pos=\"[^\"]*\" mass=\"1\" [^>]*>"})
+       {R"( damping="0.25" frictionloss="1.5")", R"( frictionloss="0.5"(?=/>\s*<))",
+        R"( fullinertia="[^"]*"(?=/><!-- kept))", R"(\s*<inertial pos="[^"]*" mass="1" [^>]*>)"})
     rest = std::regex_replace(rest, std::regex(written), "");
   std::string before = std::regex_replace(
-      std::string(kMujoco), std::regex(" diaginertia=\"0.01 0.02 0.025\" xyaxes=\"0 1 0 -1 0 0\""), "");
+      std::string(kMujoco), std::regex(R"( diaginertia="0.01 0.02 0.025" xyaxes="0 1 0 -1 0 0")"), "");
   const auto without_pos = [](const std::string& t) {
-    return std::regex_replace(t, std::regex("<inertial pos=\"[^\"]*\""), "<inertial");
+    return std::regex_replace(t, std::regex(R"(<inertial pos="[^"]*")"), "<inertial");
   };
   EXPECT_EQ(without_pos(rest), without_pos(before));
   EXPECT_EQ(joined(out.unsaid),
             "shoulder: offset 0.1 N m, elbow: play 0.002 rad: a joint of MJCF has none; it takes a "
             "body of the motor's own and a tendon with limits, as export_model RIG.yaml --out JOINT.xml "
-            "writes them "
-            "for one joint");
+            "writes them for one joint");
   EXPECT_EQ(joined(out.kept),
             "upper_body: mass: no motion shows it, shoulder: armature 0.25: the rig file has no "
             "rotor_inertia, so the torques without it were fitted");
@@ -190,7 +198,8 @@ TEST_F(IdentifiedUrdfFile, OfMujocoKeepsWhatIsNotIdentified) {
 }
 
 TEST_F(IdentifiedUrdfFile, OfMujocoThatStandsOtherwiseIsNoted) {
-  const std::string turned = std::regex_replace(std::string(kMujoco), std::regex("ref=\"30\""), "ref=\"10\"");
+  const std::string turned =
+      std::regex_replace(std::string(kMujoco), std::regex(R"(ref="30")"), R"(ref="10")");
   EXPECT_NE(identified_mjcf(turned, "two.xml", arm_)
                 .kept[0]
                 .find("shoulder: gravity at angle 0, turned by 0.349 rad"),
@@ -211,22 +220,22 @@ TEST_F(IdentifiedUrdfFile, OfMujocoIsRefusedWithLineAndRemedy) {
   refused("<option[^>]*>", "<include file='a.xml'/>",
           "two.xml:4: <include>: what other files hold is not known: let");
   refused("<freejoint/>", "<include file='a.xml'/>", "two.xml:23: <include>: bodies that this makes");
-  refused("name=\"elbow\"", "name=\"e\"",
+  refused(R"(name="elbow")", R"(name="e")",
           "two.xml: no joint 'elbow' as the rig file has it; there are: shoulder, e,");
-  refused("pos=\"0.2 0.1 0\"", "pos=\"0.3 0.1 0\"", "<joint>: the axis of joint 'shoulder' lies 50 mm and");
-  refused("class=\"main\"", "class=\"none\"", "two.xml:17: <joint>: there is no default class 'none'");
-  refused("childclass=\"small\"", "childclass=\"none\"", "there is no default class 'none'");
-  refused("class=\"main\" axis=\"0 1 0\"", "axis=\"0 -1 0\"", "another zero (ref) or the other way round");
-  refused("class=\"main\"", "type=\"slide\"", "joint 'elbow' is no hinge");
-  refused("<body name=\"plate\"", "<body name=\"plate\"><joint name='third'/></body><body name='p2'",
+  refused(R"(pos="0.2 0.1 0")", R"(pos="0.3 0.1 0")", "<joint>: the axis of joint 'shoulder' lies 50 mm and");
+  refused(R"(class="main")", R"(class="none")", "two.xml:17: <joint>: there is no default class 'none'");
+  refused(R"(childclass="small")", R"(childclass="none")", "there is no default class 'none'");
+  refused(R"(class="main" axis="0 1 0")", R"(axis="0 -1 0")", "another zero (ref) or the other way round");
+  refused(R"(class="main")", R"(type="slide")", "joint 'elbow' is no hinge");
+  refused(R"(<body name="plate")", R"(<body name="plate"><joint name='third'/></body><body name='p2')",
           "joint 'third' moves and is not one of the rig's");
-  refused("<inertial mass=\"0.5\"[^>]*>", "<geom size='.1' mass='.5'/>",
+  refused(R"(<inertial mass="0.5"[^>]*>)", "<geom size='.1' mass='.5'/>",
           "body 'tool' has no inertial, MuJoCo takes its mass");
-  refused("balanceinertia=\"false\"", "inertiafromgeom=\"true\"",
+  refused(R"(balanceinertia="false")", R"(inertiafromgeom="true")",
           "two.xml:3: <compiler>: inertiafromgeom = true");
-  refused("balanceinertia=\"false\"", "settotalmass=\"3\"", "settotalmass = 3");
-  refused("balanceinertia=\"false\"", "coordinate=\"global\"", "coordinate = global");
-  refused("damping=\"3\"", "damping=\"three\"", "damping = 'three': not a number");
+  refused(R"(balanceinertia="false")", R"(settotalmass="3")", "settotalmass = 3");
+  refused(R"(balanceinertia="false")", R"(coordinate="global")", "coordinate = global");
+  refused(R"(damping="3")", R"(damping="three")", "damping = 'three': not a number");
   refused("mujoco", "robot", "two.xml:1: <robot>: is no MuJoCo file");
 }
 
@@ -267,7 +276,7 @@ TEST_F(IdentifiedUrdfFile, MujocoNeedsTheSameTorques) {
   std::string text = identified_urdf(kRobot, "two.urdf", arm_).text;
   // MuJoCo's URDF: bodies that are fixed stay bodies, and no plane of symmetry is made of an inertia.
   text.insert(text.find("<link"),
-              "<mujoco><compiler fusestatic=\"false\" balanceinertia=\"false\"/></mujoco>");
+              R"(<mujoco><compiler fusestatic="false" balanceinertia="false"/></mujoco>)");
   std::ofstream(path) << text;
   expect_the_rigs_torques(path, arm_.rig, 1e-5);  // printed with 8 digits
 }
