@@ -13,6 +13,7 @@ import json
 import os
 import subprocess
 import tempfile
+import xml.etree.ElementTree
 from pathlib import Path
 
 import numpy
@@ -63,7 +64,7 @@ class Run:
         done = subprocess.run([columns, peer, URDF, *JOINTS], input=states.tobytes(), stdout=subprocess.PIPE, check=True)
         links = numpy.frombuffer(done.stdout).reshape(len(grid), len(JOINTS), -1)
         torque = channel("motor_current") * CONSTANTS
-        self.raw = links[:: DECIMATE]
+        self.raw = links[::DECIMATE]
         kept = slice(int(RATE / TORQUE), -int(RATE / TORQUE), DECIMATE)  # without the ends of the filter
         self.links, self.drives, self.torque, self.moves = [], [], [], []
         for j in range(len(JOINTS)):
@@ -82,8 +83,7 @@ class Run:
 
 def start():
     """The masses of ten points per link that are the bodies of the URDF."""
-    import xml.etree.ElementTree as xml
-    root = xml.parse(URDF).getroot()
+    root = xml.etree.ElementTree.parse(URDF).getroot()
     places = numpy.array([[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [1, 1, 0],
                           [1, 0, 1], [0, 1, 1]], float)
     moments = numpy.stack([second_moments(1, place, numpy.zeros((3, 3))) for place in places], 1)
@@ -195,7 +195,7 @@ def package(args):
         run("identify", *halves, "--payload", f"{halves[0]}={TRUTH} kg +- 0.005", "--payload", f"{halves[1]}=unknown", "--rig",
             RIG, "--out", "h.yaml", "--json", "h.json")
         for body in json.loads((Path(folder) / "h.json").read_text())["payloads"]:
-            print(f"package half {body['record']}: {body['mass']['value']:.3f} +- {body['mass']['standard_error']:.3f} kg")
+            print(f"package, {Path(body['record']).name}: {body['mass']['value']:.3f} +- {body['mass']['standard_error']:.3f} kg")
 
 
 def main():
