@@ -19,6 +19,7 @@ void XMLCALL started(void* data, const XML_Char* name, const XML_Char** attribut
   auto element = std::make_unique<XmlElement>();
   element->name = name;
   for (; attributes[0] != nullptr; attributes += 2) element->attributes[attributes[0]] = attributes[1];
+  element->line = XML_GetCurrentLineNumber(reading.parser);
   element->begin = std::size_t(XML_GetCurrentByteIndex(reading.parser));
   element->end = element->begin + std::size_t(XML_GetCurrentByteCount(reading.parser));
   reading.open.back()->children.push_back(std::move(element));
@@ -38,9 +39,12 @@ bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n';
 }
 
-/// Where the value of an attribute stands in a start tag, between its quotes; npos: it is not there.
-std::pair<std::size_t, std::size_t> value_place(const std::string& text, const XmlElement& element,
-                                                const std::string& name) {
+/// Where an attribute stands in a start tag: the first byte of its name, and its value between the quotes.
+struct Place {
+  std::size_t begin = std::string::npos, from = 0, to = 0;  // npos: it is not there
+};
+
+Place place_of(const std::string& text, const XmlElement& element, const std::string& name) {
   std::size_t at = element.begin + 1 + element.name.size();
   while (at < element.end) {
     while (at < element.end && is_blank(text[at])) ++at;
@@ -51,10 +55,10 @@ std::pair<std::size_t, std::size_t> value_place(const std::string& text, const X
     if (found.empty()) break;
     const std::size_t quote = text.find_first_of("\"'", at);
     const std::size_t last = text.find(text[quote], quote + 1);
-    if (found == name) return {quote + 1, last};
+    if (found == name) return {from, quote + 1, last};
     at = last + 1;
   }
-  return {std::string::npos, 0};
+  return {};
 }
 
 }  // namespace
@@ -88,14 +92,21 @@ void TextChanges::replace(std::size_t begin, std::size_t end, const std::string&
 }
 
 void TextChanges::set_attributes(const XmlElement& element,
-                                 const std::vector<std::pair<std::string, std::string>>& values) {
+                                 const std::vector<std::pair<std::string, std::string>>& values,
+                                 const std::vector<std::string>& without) {
   std::string more;
   for (const auto& [name, value] : values) {
-    const auto [from, to] = value_place(text_, element, name);
-    if (from == std::string::npos)
+    const Place place = place_of(text_, element, name);
+    if (place.begin == std::string::npos)
       more += " " + name + "=\"" + value + "\"";
     else
-      replace(from, to, value);
+      replace(place.from, place.to, value);
+  }
+  for (const std::string& name : without) {
+    Place place = place_of(text_, element, name);
+    if (place.begin == std::string::npos) continue;
+    while (is_blank(text_[place.begin - 1])) --place.begin;
+    replace(place.begin, place.to + 1, "");
   }
   if (more.empty()) return;
   std::size_t at = element.end - (text_[element.end - 2] == '/' ? 2 : 1);

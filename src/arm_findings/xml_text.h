@@ -15,6 +15,7 @@ struct XmlElement {
   std::map<std::string, std::string> attributes;
   std::size_t begin = 0, end = 0;  // of the start tag, in bytes; end: behind ">"
   std::size_t close = 0;           // where the end tag begins; of <a/> that is `end`
+  std::size_t line = 0;            // of the start tag, from 1
   std::vector<std::unique_ptr<XmlElement>> children;
 
   bool is_empty_tag() const { return close == end; }
@@ -30,9 +31,10 @@ class TextChanges {
  public:
   explicit TextChanges(const std::string& text) : text_(text) {}
   void replace(std::size_t begin, std::size_t end, const std::string& with);
-  /// Writes or adds attributes of an element; one that is there keeps its place.
+  /// Writes or adds attributes of an element; one that is there keeps its place. Those of `without` go.
   void set_attributes(const XmlElement& element,
-                      const std::vector<std::pair<std::string, std::string>>& values);
+                      const std::vector<std::pair<std::string, std::string>>& values,
+                      const std::vector<std::string>& without = {});
   /// Adds lines into an element: behind its start tag, or before its end tag, indented as its children are.
   void add_first(const XmlElement& element, const std::vector<std::string>& lines);
   void add_last(const XmlElement& element, const std::vector<std::string>& lines);

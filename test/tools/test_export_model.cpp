@@ -40,6 +40,30 @@ TEST_F(ExportModel, SaysWhatTheFileDoesNotHold) {
   EXPECT_EQ(run("export_model two_inertia_servo.yaml --out servo.xml").err, "");
 }
 
+TEST_F(ExportModel, ArmsOwnMujocoFile) {
+  for (const char* file : {"two_link_arm.yaml", "two_link_arm.urdf"})
+    write(file, content(package_file(std::string("config/two_link_arm/") + file)));
+  write("arm.xml",
+        "<mujoco><worldbody><body name='upper'><joint name='shoulder' axis='0 -1 0'/><!-- mine -->"
+        "<inertial pos='.1 0 0' mass='2' diaginertia='.01 .02 .02'/><body pos='.3 0 0'>"
+        "<joint name='elbow' axis='0 -1 0' damping='0.1'/></body></body></worldbody></mujoco>");
+  const Outcome outcome = run("export_model --mjcf arm.xml --rig two_link_arm.yaml --out identified.xml");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  expect_contains(outcome.err, "kept as in the file: upper: the rig file has no identified links");
+  expect_contains(outcome.err, "does not say: elbow: play 0.003 rad");
+  EXPECT_EQ(read("identified.xml"),
+            "<mujoco><worldbody><body name='upper'><joint name='shoulder' axis='0 -1 0' damping=\"0.3\" "
+            "frictionloss=\"0.4\" armature=\"0.12\"/><!-- mine --><inertial pos='.1 0 0' mass='2' "
+            "diaginertia='.01 .02 .02'/><body pos='.3 0 0'><joint name='elbow' axis='0 -1 0' damping='0.1' "
+            "frictionloss=\"0.15\" armature=\"0.03\"/></body></body></worldbody></mujoco>");
+  EXPECT_EQ(run("export_model --mjcf arm.xml --rig two_link_arm.yaml --out identified.urdf").code, 64);
+  EXPECT_EQ(
+      run("export_model --mjcf arm.xml --urdf two_link_arm.urdf --rig two_link_arm.yaml --out i.xml").code,
+      64);
+  EXPECT_EQ(run("export_model --mjcf two_link_arm.urdf --rig two_link_arm.yaml --out i.xml").code, 65);
+  EXPECT_EQ(run("export_model --mjcf none.xml --rig two_link_arm.yaml --out i.xml").code, 66);
+}
+
 TEST_F(ExportModel, ExitCodes) {
   EXPECT_EQ(run("export_model two_inertia_servo.yaml").code, 64);
   EXPECT_EQ(run("export_model two_inertia_servo.yaml --out servo.txt").code, 64);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <iostream>
 
-#include "backlash_diagnosis/arm_findings/identified_urdf.h"
+#include "backlash_diagnosis/arm_findings/identified_model.h"
 #include "tools/arm/arm_commands.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/record_file.h"
@@ -9,9 +9,13 @@
 namespace backlash::tools {
 
 int export_arm(const Arguments& arguments) {
-  const std::string rig = arguments.text("rig"), urdf = arguments.text("urdf"), out = arguments.text("out");
+  const bool urdf = arguments.has("urdf");
+  const std::string rig = arguments.text("rig"), robot = arguments.text(urdf ? "urdf" : "mjcf"),
+                    out = arguments.text("out");
   const geared_arm::GearedArm arm = geared_arm::load_geared_arm(rig);
-  const arm_findings::IdentifiedUrdf model = arm_findings::identified_urdf(arm::read_urdf(urdf), urdf, arm);
+  const std::string text = arm::read_urdf(robot);
+  const arm_findings::IdentifiedModel model = urdf ? arm_findings::identified_urdf(text, robot, arm)
+                                                   : arm_findings::identified_mjcf(text, robot, arm);
   write_text(out, model.text);
   for (const std::string& what : model.kept)
     std::cerr << "export_model: kept as in the file: " << what << '\n';
