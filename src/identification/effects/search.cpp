@@ -104,6 +104,7 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
     return result;
   }
   Hypothesis h = add_effects_or_teeth(result.declared, context);
+  h = take_simpler(h, context);
   h = add_learned(h, context);
   h = drop_stand_ins(h, context);
   result.found = believe_all(h, result.declared, unseen, context);

@@ -39,6 +39,9 @@ Hypothesis with_best_shapes(const Hypothesis& h, const SearchContext& context);
 /// Without one effect; those that came after it are fitted again, one by one.
 Hypothesis without_effect(const Hypothesis& h, std::size_t effect, const SearchContext& context);
 
+/// Simpler names in place of effects, where they explain the same beside the others.
+Hypothesis take_simpler(const Hypothesis& h, const SearchContext& context);
+
 /// One learned map, of those that explain most.
 Hypothesis add_map(const Hypothesis& h, const SearchContext& context);
 /// A learned map where named effects leave much: tried without the effects that may be stand-ins, then with

@@ -126,6 +126,26 @@ TEST(WithoutEffect, LeavesTheOthersFitted) {
   EXPECT_GT(size(without_effect(*both, 1, bench.context)), 2);
 }
 
+TEST(TakeSimpler, TakesTheNameWithFewerShapesWhereThatExplainsTheSame) {
+  Effect wave = cogging_effect(0.8, 1, 0.6);
+  wave.alternatives = {{"gravity", {{{"amplitude", 0.8}, {"phase", 0.6}}}}};
+  OneInertiaMachine weight;
+  weight.extra = [](double q, double) { return 0.8 * std::sin(q + 0.6); };
+  const SearchBench bench{weight};
+  const auto start = refitted(fit_declared(test::one_inertia_rig(), bench.context), {wave}, bench.context);
+  ASSERT_TRUE(start);
+  const Hypothesis simpler = take_simpler(*start, bench.context);
+  EXPECT_EQ(ids(simpler), std::vector<std::string>{"gravity"});
+  ASSERT_EQ(simpler.effects[0].alternatives.size(), 1u);
+  EXPECT_EQ(simpler.effects[0].alternatives[0].id, "cogging");
+
+  wave.candidate = cogging_effect(0.8, 7, 0.6).candidate;
+  const SearchBench teeth{with_cogging()};
+  const auto right = refitted(fit_declared(test::one_inertia_rig(), teeth.context), {wave}, teeth.context);
+  ASSERT_TRUE(right);
+  EXPECT_EQ(ids(take_simpler(*right, teeth.context)), std::vector<std::string>{"cogging"});
+}
+
 TEST(OtherTeeth, AreAsStiffAndDampedUnderTheSameTorque) {
   const model::Rig rig = test::servo_file().rig;
   const auto other = with_hertzian_teeth(rig, 200);

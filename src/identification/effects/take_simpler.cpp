@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Beside the effects that were found later a name with fewer shapes may explain the same: gravity, where
+// cogging of an order near 1 took a part of them.
+#include <algorithm>
+#include <utility>
+
+#include "steps.h"
+
+namespace backlash::identification {
+namespace {
+
+std::size_t shapes_of(const Candidate& candidate) {
+  const model::TermType& type = model::term_type(candidate.id);
+  return type.search ? candidate.terms.size() * type.search->shapes.size() : 0;
+}
+
+}  // namespace
+
+Hypothesis take_simpler(const Hypothesis& before, const SearchContext& context) {
+  Hypothesis h = before;
+  for (std::size_t i = 0; i < h.effects.size(); ++i) {
+    const Effect now = h.effects[i];
+    for (std::size_t k = 0; k < now.alternatives.size(); ++k) {
+      if (shapes_of(now.alternatives[k]) >= shapes_of(now.candidate)) continue;
+      context.report("trying " + now.alternatives[k].id + " instead of " + now.candidate.id);
+      std::vector<Effect> effects = h.effects;
+      std::swap(effects[i].candidate, effects[i].alternatives[k]);
+      auto with = refitted(h, std::move(effects), context);
+      if (!with || size(*with) >= context.settings.revision.as_good * size(h)) continue;
+      h = with_rejected(std::move(*with), now.candidate.id,
+                        now.alternatives[k].id + " explains the same and has fewer values");
+      break;
+    }
+  }
+  return h;
+}
+
+}  // namespace backlash::identification
