@@ -28,6 +28,7 @@ constexpr double kVague = 30;  // choice: times the scale: standard deviation of
 constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
 constexpr double kOversampling =
     1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
+constexpr double kBetweenHolds = 0.5;  // theory: samples, between a torque that is held and one of the moment
 constexpr double kSkewOfSample = 1e-3;     // simulation: samples, that interpolation leaves wrong of a skew
 constexpr double kUnsureOfSampling = 0.3;  // simulation: of what sampling makes of a value
 constexpr double kEquations = 5e-5;  // simulation: relative, of a value > 0 that moves the load: how well a
@@ -56,17 +57,6 @@ double spread(std::vector<double> values, const std::vector<char>& counts) {
   }
   for (double& value : values) value -= sum / std::max(1.0, count);
   return rms(values, counts);
-}
-
-Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& p) {
-  const Machine machine = unknowns.machine(p);
-  Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
-  const Eigen::Index own = rows.size();
-  rows.conservativeResize(own + unknowns.size() + Eigen::Index(machine.priors.size()));
-  rows.segment(own, unknowns.size()) = unknowns.prior(p);
-  for (std::size_t i = 0; i < machine.priors.size(); ++i)
-    rows[own + unknowns.size() + Eigen::Index(i)] = machine.priors[i](machine.rig);
-  return rows;
 }
 
 /// Points that the rig refuses are left out.
@@ -148,6 +138,17 @@ void allow_for_left(signal::LeastSquaresFit& fit, Eigen::Index rows, double left
 }
 
 }  // namespace
+
+Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& p) {
+  const Machine machine = unknowns.machine(p);
+  Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
+  const Eigen::Index own = rows.size();
+  rows.conservativeResize(own + unknowns.size() + Eigen::Index(machine.priors.size()));
+  rows.segment(own, unknowns.size()) = unknowns.prior(p);
+  for (std::size_t i = 0; i < machine.priors.size(); ++i)
+    rows[own + unknowns.size() + Eigen::Index(i)] = machine.priors[i](machine.rig);
+  return rows;
+}
 
 double farthest_logarithm() {
   return 3 * std::log(kFarthest);
@@ -248,6 +249,20 @@ Eigen::VectorXd RecordSet::rows(const model::Rig& rig, const std::vector<Calibra
   return rows;
 }
 
+Eigen::VectorXd RecordSet::rows_of_torque(const std::vector<std::vector<double>>& torque) const {
+  std::vector<std::vector<double>> smooth = torque;
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    for (std::size_t k = 0; k < smooth[i].size(); ++k)
+      if (records_[i].direction[k] == 0) smooth[i][k] = 0;
+    smooth[i] = signal::low_pass(smooth[i], records_[i].data().interval, records_[i].cutoff);
+  }
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(Eigen::Index(layout_.size()));
+  for (std::size_t i = 0; i < layout_.size(); ++i)
+    if (const Row& r = layout_[i]; !r.deflection && records_[r.record].counts[r.sample])
+      rows[Eigen::Index(i)] = smooth[r.record][r.sample] / weights_[r.record].torque;
+  return rows;
+}
+
 void RecordSet::prepare(const std::vector<Machine>& machines) const {
   for (std::size_t i = 0; i < records_.size(); ++i) {
     std::vector<LoadAsked> asked;
@@ -257,23 +272,28 @@ void RecordSet::prepare(const std::vector<Machine>& machines) const {
   }
 }
 
-Unknowns::Unknowns(const Machine& start)
-    : start_(start),
-      delays_(start.largest_delay > 0),
-      offsets_(!start.rig.mesh.rigid && !start.encoders_known),
-      per_record_(std::size_t(delays_) + std::size_t(offsets_)) {}
+Unknowns::Unknowns(const Machine& start) : start_(start) {
+  const double gap = start.rig.mesh.backlash / start.rig.mesh.lever(), place = gap > 0 ? gap : kDefaultGap;
+  if (start.largest_delay > 0)
+    of_record_.push_back({&Calibration::torque_delay, 1, start.largest_delay, start.largest_delay});
+  if (!start.rig.mesh.rigid && !start.encoders_known)
+    of_record_.push_back({&Calibration::encoder_offset, place, kVague * place});
+  if (start.torque_offset > 0)
+    of_record_.push_back({&Calibration::torque_offset, start.torque_offset, start.torque_offset});
+  if (start.encoder_drift > 0)
+    of_record_.push_back({&Calibration::encoder_drift, start.encoder_drift, start.encoder_drift});
+}
 
 Eigen::VectorXd Unknowns::values() const {
   Eigen::VectorXd p = Eigen::VectorXd::Zero(size());
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     if (!start_.parameters[i].positive) p[Eigen::Index(i)] = start_.parameters[i].get(start_.rig);
-  for (std::size_t r = 0; r < records(); ++r) {
-    const Calibration& c = start_.calibrations[r];
-    if (delays_)
-      p[first_of(r)] =
-          start_.largest_delay * std::atanh(std::clamp(c.torque_delay / start_.largest_delay, -0.99, 0.99));
-    if (offsets_) p[first_of(r) + delays_] = c.encoder_offset;
-  }
+  for (std::size_t r = 0; r < records(); ++r)
+    for (std::size_t i = 0; i < of_record_.size(); ++i) {
+      const double value = start_.calibrations[r].*of_record_[i].at, most = of_record_[i].most;
+      p[first_of(r) + Eigen::Index(i)] =
+          std::isinf(most) ? value : most * std::atanh(std::clamp(value / most, -0.99, 0.99));
+    }
   return p;
 }
 
@@ -281,9 +301,9 @@ Eigen::VectorXd Unknowns::scale() const {
   Eigen::VectorXd s = Eigen::VectorXd::Ones(size());
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     if (!start_.parameters[i].positive) s[Eigen::Index(i)] = start_.parameters[i].scale;
-  const double gap = start_.rig.mesh.backlash / start_.rig.mesh.lever();
-  for (std::size_t r = 0; r < records() && offsets_; ++r)
-    s[first_of(r) + delays_] = gap > 0 ? gap : kDefaultGap;
+  for (std::size_t r = 0; r < records(); ++r)
+    for (std::size_t i = 0; i < of_record_.size(); ++i)
+      s[first_of(r) + Eigen::Index(i)] = of_record_[i].scale;
   return s;
 }
 
@@ -299,12 +319,11 @@ model::Rig Unknowns::rig(const Eigen::VectorXd& values) const {
 
 std::vector<Calibration> Unknowns::calibrations(const Eigen::VectorXd& values) const {
   std::vector<Calibration> all = start_.calibrations;
-  for (std::size_t r = 0; r < records(); ++r) {
-    if (delays_) {
-      all[r].torque_delay = start_.largest_delay * std::tanh(values[first_of(r)] / start_.largest_delay);
+  for (std::size_t r = 0; r < records(); ++r)
+    for (std::size_t i = 0; i < of_record_.size(); ++i) {
+      const double value = values[first_of(r) + Eigen::Index(i)], most = of_record_[i].most;
+      all[r].*of_record_[i].at = std::isinf(most) ? value : most * std::tanh(value / most);
     }
-    if (offsets_) all[r].encoder_offset = values[first_of(r) + delays_];
-  }
   return all;
 }
 
@@ -312,7 +331,9 @@ Eigen::VectorXd Unknowns::prior(const Eigen::VectorXd& values) const {
   Eigen::VectorXd sigma = kVague * scale();
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     if (start_.parameters[i].positive) sigma[Eigen::Index(i)] = std::log(kFarthest);
-  for (std::size_t r = 0; r < records() && delays_; ++r) sigma[first_of(r)] = start_.largest_delay;
+  for (std::size_t r = 0; r < records(); ++r)
+    for (std::size_t i = 0; i < of_record_.size(); ++i)
+      sigma[first_of(r) + Eigen::Index(i)] = of_record_[i].deviation;
   return (values - this->values()).cwiseQuotient(sigma);
 }
 
@@ -332,6 +353,18 @@ signal::Measured Unknowns::parameter(const MachineFit& fit, std::size_t i) const
   m.standard_error *= m.value * slope;
   if (fit.reach.size() > 0) m.standard_error = std::max(m.standard_error, fit.reach[Eigen::Index(i)]);
   return m;
+}
+
+std::optional<Eigen::Index> Unknowns::delay(std::size_t record) const {
+  if (!(start_.largest_delay > 0)) return std::nullopt;
+  return first_of(record);
+}
+
+signal::Measured Unknowns::torque_offset(const MachineFit& fit, std::size_t record) const {
+  for (std::size_t i = 0; i < of_record_.size(); ++i)
+    if (of_record_[i].at == &Calibration::torque_offset)
+      return fit.fit.parameter(first_of(record) + Eigen::Index(i));
+  return {fit.machine.calibrations[record].torque_offset, 0};
 }
 
 std::map<std::string, signal::Measured> Unknowns::parameters(const MachineFit& fit) const {
@@ -380,6 +413,45 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
     allow_for_left(
         fit.fit, rows,
         fit.fit.residuals.head(rows).norm() * share_beyond_noise(records.misfit(fit.machine).deflection));
+}
+
+void correct_for_noise_of_motion(MachineFit& fit, const Machine& start, const RecordSet& records) {
+  const Eigen::MatrixXd& j = fit.fit.jacobian;
+  const Eigen::MatrixXd gain = signal::symmetric_inverse(signal::gram(j));
+  const Unknowns unknowns(start);
+  Eigen::VectorXd bias = Eigen::VectorXd::Zero(fit.fit.values.size());
+  for (std::size_t i = 0; i < start.parameters.size(); ++i) {
+    const rig_file::RigParameter& p = rig_file::servo_parameter(start.parameters[i].name);
+    const bool inertia = p.kind == rig_file::ParameterKind::inertia;
+    if (p.part != rig_file::RigPart::motor ||
+        !(inertia || p.kind == rig_file::ParameterKind::viscous_friction))
+      continue;
+    double squares = 0;  // that the noise adds to those of the value's column
+    for (std::size_t r = 0; r < records.records().size(); ++r) {
+      const PreparedServo& record = records.records()[r];
+      const double w = 2 * M_PI * record.cutoff, white = record_noise(record.data()).motor,
+                   speed = std::min(w * std::sqrt(2 * record.cutoff * record.data().interval / 3) * white,
+                                    record.data().rate_noise),
+                   noise = inertia ? speed * w * std::sqrt(0.6) : speed;
+      double rows = 0;
+      for (std::size_t k = 0; k < record.data().size(); k += stride(record)) rows += record.counts[k];
+      squares += rows * std::pow(noise * p.get(fit.machine.rig) / records.weights()[r].torque, 2);
+    }
+    bias -= squares * gain.col(Eigen::Index(i));
+  }
+  fit.fit.values -= bias;
+  fit.machine = unknowns.machine(fit.fit.values);
+  fit.fit.covariance += std::pow(kUnsureOfSampling, 2) * bias * bias.transpose();
+}
+
+void allow_for_hold(MachineFit& fit, const Machine& start) {
+  const Unknowns unknowns(start);
+  const Eigen::MatrixXd covariance = fit.fit.covariance;
+  for (std::size_t r = 0; r < start.calibrations.size(); ++r)
+    if (const auto delay = unknowns.delay(r)) {
+      const Eigen::VectorXd shift = covariance.col(*delay) * (kBetweenHolds / covariance(*delay, *delay));
+      fit.fit.covariance += shift * shift.transpose();
+    }
 }
 
 void allow_for_misfit(MachineFit& fit, const RecordSet& records) {

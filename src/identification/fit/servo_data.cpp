@@ -26,6 +26,7 @@ constexpr double kClear = 0.02;  // choice: of the speed: noise that does not hi
 constexpr double kSureSpeed =
     5;  // choice: standard deviations of the speed's noise, from which it has a sign
 constexpr double kWidestBand = 0.2;   // theory: of the sampling rate, up to which differences are derivatives
+constexpr double kReach = 0.3;        // theory: periods of its band that a smooth speed is sharp to
 constexpr double kNarrower = 0.9;     // choice: from one band that is tried to the next
 constexpr double kLeastPeriods = 10;  // choice: of the band, in the record: below, nothing is smoothed
 constexpr double kLoadRateBand = 120 / model::kTriedResonance;  // simulation: in units of the mesh resonance
@@ -118,9 +119,11 @@ void smooth_slow_motion(ServoData& data) {
     const std::vector<double> rate = fast_derivative(smooth, data.interval);
     const double noise = position * rate_of_noise(band, data.interval);
     if (noise > kClear * root_mean_square(rate)) continue;
+    data.recorded_motor = std::move(data.motor);
     data.motor = smooth;
     data.motor_rate = rate;
     data.rate_noise = noise;
+    data.rate_reach += std::lround(kReach / (band * data.interval));
     return;
   }
 }
@@ -172,7 +175,8 @@ ServoData servo_data(const record::EvenGrid& grid, const model::Rig& rig, double
     data.rate_noise = std::max(data.rate_noise, kRateNoise * rounding / data.interval);
     smooth_slow_motion(data);
   }
-  data.motor_acceleration = second_difference(data.motor, data.interval);
+  const bool recorded = rig.link_locked && !data.recorded_motor.empty();
+  data.motor_acceleration = second_difference(recorded ? data.recorded_motor : data.motor, data.interval);
   if (rig.mesh.rigid) data.smooth_acceleration = smooth_acceleration(data, noise);
   if (!record.has(record::Channel::load_position)) return data;
   data.load = scaled(record, record::Channel::load_position, 1);

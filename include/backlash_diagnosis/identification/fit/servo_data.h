@@ -17,8 +17,10 @@ struct ServoData {
   double interval = 0;                         // s
   std::vector<double> torque;                  // N m, of the motor
   std::vector<double> motor, motor_rate;       // rad, rad/s (five-point difference)
+  std::vector<double> recorded_motor;          // rad, before it was smoothed; empty where it was not
   std::vector<double> motor_acceleration;      // rad/s^2 (second difference)
   std::vector<double> smooth_acceleration;     // rad/s^2, of a machine with one inertia: see servo_data()
+  long rate_reach = 2;                         // samples to either side that motor_rate is taken from
   double rate_noise = 0;                       // rad/s, standard deviation of the noise of motor_rate
   std::vector<double> load, load_rate;         // rad, rad/s (low-passed)
   double load_rate_cutoff = 0;                 // Hz, of that low-pass
