@@ -28,7 +28,6 @@ constexpr double kVague = 30;  // choice: times the scale: standard deviation of
 constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
 constexpr double kOversampling =
     1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
-constexpr double kBetweenHolds = 0.5;  // theory: samples, between a torque that is held and one of the moment
 constexpr double kSkewOfSample = 1e-3;     // simulation: samples, that interpolation leaves wrong of a skew
 constexpr double kUnsureOfSampling = 0.3;  // simulation: of what sampling makes of a value
 constexpr double kEquations = 5e-5;  // simulation: relative, of a value > 0 that moves the load: how well a
@@ -413,45 +412,6 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
     allow_for_left(
         fit.fit, rows,
         fit.fit.residuals.head(rows).norm() * share_beyond_noise(records.misfit(fit.machine).deflection));
-}
-
-void correct_for_noise_of_motion(MachineFit& fit, const Machine& start, const RecordSet& records) {
-  const Eigen::MatrixXd& j = fit.fit.jacobian;
-  const Eigen::MatrixXd gain = signal::symmetric_inverse(signal::gram(j));
-  const Unknowns unknowns(start);
-  Eigen::VectorXd bias = Eigen::VectorXd::Zero(fit.fit.values.size());
-  for (std::size_t i = 0; i < start.parameters.size(); ++i) {
-    const rig_file::RigParameter& p = rig_file::servo_parameter(start.parameters[i].name);
-    const bool inertia = p.kind == rig_file::ParameterKind::inertia;
-    if (p.part != rig_file::RigPart::motor ||
-        !(inertia || p.kind == rig_file::ParameterKind::viscous_friction))
-      continue;
-    double squares = 0;  // that the noise adds to those of the value's column
-    for (std::size_t r = 0; r < records.records().size(); ++r) {
-      const PreparedServo& record = records.records()[r];
-      const double w = 2 * M_PI * record.cutoff, white = record_noise(record.data()).motor,
-                   speed = std::min(w * std::sqrt(2 * record.cutoff * record.data().interval / 3) * white,
-                                    record.data().rate_noise),
-                   noise = inertia ? speed * w * std::sqrt(0.6) : speed;
-      double rows = 0;
-      for (std::size_t k = 0; k < record.data().size(); k += stride(record)) rows += record.counts[k];
-      squares += rows * std::pow(noise * p.get(fit.machine.rig) / records.weights()[r].torque, 2);
-    }
-    bias -= squares * gain.col(Eigen::Index(i));
-  }
-  fit.fit.values -= bias;
-  fit.machine = unknowns.machine(fit.fit.values);
-  fit.fit.covariance += std::pow(kUnsureOfSampling, 2) * bias * bias.transpose();
-}
-
-void allow_for_hold(MachineFit& fit, const Machine& start) {
-  const Unknowns unknowns(start);
-  const Eigen::MatrixXd covariance = fit.fit.covariance;
-  for (std::size_t r = 0; r < start.calibrations.size(); ++r)
-    if (const auto delay = unknowns.delay(r)) {
-      const Eigen::VectorXd shift = covariance.col(*delay) * (kBetweenHolds / covariance(*delay, *delay));
-      fit.fit.covariance += shift * shift.transpose();
-    }
 }
 
 void allow_for_misfit(MachineFit& fit, const RecordSet& records) {
