@@ -123,7 +123,7 @@ void smooth_slow_motion(ServoData& data) {
     data.motor = smooth;
     data.motor_rate = rate;
     data.rate_noise = noise;
-    data.rate_reach += std::lround(kReach / (band * data.interval));
+    data.smooth_reach = std::lround(kReach / (band * data.interval));
     return;
   }
 }
@@ -175,8 +175,7 @@ ServoData servo_data(const record::EvenGrid& grid, const model::Rig& rig, double
     data.rate_noise = std::max(data.rate_noise, kRateNoise * rounding / data.interval);
     smooth_slow_motion(data);
   }
-  const bool recorded = rig.link_locked && !data.recorded_motor.empty();
-  data.motor_acceleration = second_difference(recorded ? data.recorded_motor : data.motor, data.interval);
+  data.motor_acceleration = second_difference(data.motor, data.interval);
   if (rig.mesh.rigid) data.smooth_acceleration = smooth_acceleration(data, noise);
   if (!record.has(record::Channel::load_position)) return data;
   data.load = scaled(record, record::Channel::load_position, 1);
@@ -188,6 +187,13 @@ ServoData servo_data(const record::EvenGrid& grid, const model::Rig& rig, double
   data.load_rate_cutoff = resonance > 0 ? std::min(kLoadRateBand * resonance, highest) : highest;
   take_rates_of_load(data);
   return data;
+}
+
+void press_as_recorded(ServoData& data) {
+  if (data.recorded_motor.empty()) return;
+  data.teeth_recorded = true;
+  data.rate_reach += data.smooth_reach;
+  data.motor_acceleration = second_difference(data.recorded_motor, data.interval);
 }
 
 ServoData with_columns(const ServoData& pattern, std::vector<double> torque, std::vector<double> motor,

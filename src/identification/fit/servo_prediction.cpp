@@ -100,7 +100,7 @@ struct Drive {
       motion.first_load = (data.first_load + rig.encoder_skew * data.first_load_rate - offset) / gain;
       motion.first_load_rate = data.first_load_rate / gain;
     } else if (offset != 0 || drift != 0) {  // of teeth that press, which a low-pass would round off
-      changed = data.recorded_motor.empty() ? data.motor : data.recorded_motor;
+      changed = data.teeth_recorded ? data.recorded_motor : data.motor;
       const double middle = 0.5 * double(changed.size());
       for (std::size_t k = 0; k < changed.size(); ++k)
         changed[k] += offset - drift * data.interval * (double(k) - middle);

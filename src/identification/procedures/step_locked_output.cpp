@@ -146,6 +146,7 @@ OfRecord identify_record(const CaseRecord& r, const model::Rig& declared, const 
   const std::string& name = r.record.name;
   ServoData data = servo_data(record::EvenGrid{r.record, r.lost}, rig);
   data.load.clear();
+  press_as_recorded(data);
   OutputErrorSettings settings;
   settings.fit = with_bands(settings.fit, rig, {data});
   settings.parameters.assign(std::begin(kNames), std::end(kNames));
