@@ -124,6 +124,8 @@ signal::LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const V
   ceres::Solve(solver, &problem, &summary);
   fit.converged = summary.termination_type == ceres::CONVERGENCE;
   const MatrixXd& j = fit.jacobian;
+  if (j.rows() != fit.residuals.size() || !j.allFinite())
+    throw CannotIdentify("the model cannot be evaluated beside the start values");
   const double variance = fit.residuals.squaredNorm() / std::max<double>(1, double(j.rows() - j.cols()));
   const VectorXd unit = j.colwise().norm().cwiseInverse();
   const MatrixXd scaled = j * unit.asDiagonal();

@@ -11,7 +11,6 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
-#include "backlash_diagnosis/identification/procedures/locked_output.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"

@@ -67,9 +67,17 @@ std::shared_ptr<const Term> any_term(const TermType& type) {
 
 }  // namespace
 
+namespace {
+
+/// Part of how a machine is built, or never sought.
+bool is_built_in(const TermType& type) {
+  return !type.search || type.gap_variation != GapVariation::none || type.search->needs_turning_link;
+}
+
+}  // namespace
+
 ShownIn shown_in(const TermType& type) {
-  if (!type.search || type.gap_variation != GapVariation::none || type.search->needs_turning_link)
-    return ShownIn::neither;
+  if (is_built_in(type)) return ShownIn::neither;
   const std::shared_ptr<const Term> term = any_term(type);
   if (term->loads_flanks() || term->shape_follows_torque()) return ShownIn::neither;
   const Sensing sensed = sensing({term});
@@ -161,7 +169,8 @@ bool has_order(const TermType& type) {
 std::vector<SearchedTerm> searched_terms(ShownIn channel, const MotionRange& range) {
   std::vector<SearchedTerm> all;
   for (const TermType& type : term_types()) {
-    if (shown_in(type) != channel || (!type.shapes_friction && refined_shapes(type).size() > 1)) continue;
+    if (is_built_in(type) || shown_in(type) != channel) continue;
+    if (!type.shapes_friction && refined_shapes(type).size() > 1) continue;
     SearchedTerm term{&type, {}, {}};
     if (type.shapes_friction)
       for (const double time : kBristles) term.shapes.push_back(time * range.speed);
@@ -182,6 +191,12 @@ std::vector<SearchedTerm> searched_terms(ShownIn channel, const MotionRange& ran
     all.insert(all.end(), variants.begin(), variants.end());
   }
   return all;
+}
+
+std::shared_ptr<const Term> term_of(const SearchedTerm& searched, double strength) {
+  ParameterValues values = completed(*searched.type, searched.given);
+  values[searched.type->search->strength] = strength;
+  return make_term(searched.type->id, values);
 }
 
 }  // namespace backlash::model

@@ -21,24 +21,43 @@ namespace {
 /// A load that stands.
 class LockedLoad {
  public:
-  explicit LockedLoad(const model::Rig& rig) : train_(rig) {}
+  explicit LockedLoad(const model::Rig& rig) : train_(rig), plain_(train_.plain_load()) {
+    if (!plain_) return;
+    const model::PowerContact law = *train_.power_contact();
+    forces_ = {train_.equations(),
+               {law.exponent, law.stiffness, law.loss, law.damping, 0.5 * train_.backlash()},
+               train_.load_inertia(),
+               0};
+  }
 
   double q = 0, w = 0;
 
-  double begin(const Segment& s) { return forces(s.at(0)).mesh_torque; }
+  double begin(const Segment& s) { return (last_ = forces(s.at(0))).mesh_torque; }
 
   double step(const Segment& s, Halves<double>& sum) {
-    const model::GearTrain::LoadForces end = forces(s.at(1));
-    sum.add(0, 1, forces(s.at(0)).mesh_on_motor, forces(s.at(0.5)).mesh_on_motor, end.mesh_on_motor);
-    return end.mesh_torque;
+    const Forces start = last_;
+    last_ = forces(s.at(1));
+    sum.add(0, 1, start.mesh_on_motor, forces(s.at(0.5)).mesh_on_motor, last_.mesh_on_motor);
+    return last_.mesh_torque;
   }
 
  private:
-  model::GearTrain::LoadForces forces(const Moment& m) const {
-    return train_.load_forces({m.time, m.motor, m.motor_rate, 0, 0, 0});
+  struct Forces {
+    double mesh_torque, mesh_on_motor;
+  };
+  Forces forces(const Moment& m) const {
+    if (plain_) {
+      const double torque = forces_.forces(m, 0, 0).mesh_torque;
+      return {torque, -torque};
+    }
+    const model::GearTrain::LoadForces f = train_.load_forces({m.time, m.motor, m.motor_rate, 0, 0, 0});
+    return {f.mesh_torque, f.mesh_on_motor};
   }
 
   model::GearTrain train_;
+  bool plain_;
+  PlainLoad<double> forces_{};
+  Forces last_{};
 };
 
 void check(const model::Rig& rig) {

@@ -90,7 +90,10 @@ struct SearchedTerm {
 };
 
 /// All terms that a search of that channel may try, but those with several shapes to be searched and those
-/// that are part of how a machine is built (TermSearch::needs_turning_link, TermType::gap_variation).
+/// that are part of how a machine is built (TermSearch::needs_turning_link, TermType::gap_variation). Those
+/// of neither channel (a flank under load, a delay) show by what the whole machine makes of them.
 std::vector<SearchedTerm> searched_terms(ShownIn channel, const MotionRange& range);
+/// Of one of these, with that strength.
+std::shared_ptr<const Term> term_of(const SearchedTerm& searched, double strength);
 
 }  // namespace backlash::model

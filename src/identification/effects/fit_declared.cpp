@@ -6,7 +6,6 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/record/encoder_skew.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
-#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "steps.h"
 
@@ -19,17 +18,6 @@ bool can_be_fitted(const rig_file::RigParameter& p, const model::Rig& rig) {
   if (rig.coupled && !rig_file::shown_by_deflection(p)) return false;
   if (p.part == rig_file::RigPart::link && !simulation::load_moves_freely(rig)) return false;
   return p.get(rig) != 0 || p.kind == rig_file::ParameterKind::encoder_skew;
-}
-
-/// With a locked link the middle of the gap and of both wind-ups is in the middle of the travel, and both
-/// flanks must have touched.
-void start_in_travel(Machine& machine, const std::vector<ServoData>& data) {
-  double& gap = machine.rig.mesh.backlash;
-  for (std::size_t i = 0; i < data.size(); ++i) {
-    const auto [low, high] = signal::extent(data[i].motor);
-    machine.calibrations[i].encoder_offset = -0.5 * (low + high);
-    gap = std::min(gap, 0.5 * (high - low) * machine.rig.mesh.lever());
-  }
 }
 
 /// The skew of the encoders as the records show it at once, where that is clear: a start for the fit.

@@ -62,4 +62,13 @@ void move_delay_to_term(Machine& machine, double interval) {
   without_calibration(machine);
 }
 
+void start_in_travel(Machine& machine, const std::vector<ServoData>& data) {
+  double& gap = machine.rig.mesh.backlash;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const auto [low, high] = signal::extent(data[i].motor);
+    machine.calibrations[i].encoder_offset = -0.5 * (low + high);
+    gap = std::min(gap, 0.5 * (high - low) * machine.rig.mesh.lever());
+  }
+}
+
 }  // namespace backlash::identification

@@ -3,6 +3,8 @@
 // whether a delay is calibration or an effect.
 #pragma once
 
+#include <vector>
+
 #include "joint_fit.h"
 
 namespace backlash::identification {
@@ -21,6 +23,10 @@ void limit_delay(Machine& machine, double longest);
 /// rad: the offset of the encoders with which the median of motor minus load is 0. Each record has its own,
 /// as an incremental encoder finds a new zero whenever the robot is switched on.
 double middle_offset(const ServoData& record);
+
+/// With a locked link the middle of the gap and of both wind-ups is in the middle of the travel, and both
+/// flanks must have touched.
+void start_in_travel(Machine& machine, const std::vector<ServoData>& data);
 
 /// Sets the delays of the calibration to 0 if a term of the model is the delay.
 void without_calibration(Machine& machine);

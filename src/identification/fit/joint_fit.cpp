@@ -58,17 +58,6 @@ double spread(std::vector<double> values, const std::vector<char>& counts) {
   return rms(values, counts);
 }
 
-Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& p) {
-  const Machine machine = unknowns.machine(p);
-  Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
-  const Eigen::Index own = rows.size();
-  rows.conservativeResize(own + unknowns.size() + Eigen::Index(machine.priors.size()));
-  rows.segment(own, unknowns.size()) = unknowns.prior(p);
-  for (std::size_t i = 0; i < machine.priors.size(); ++i)
-    rows[own + unknowns.size() + Eigen::Index(i)] = machine.priors[i](machine.rig);
-  return rows;
-}
-
 /// Points that the rig refuses are left out.
 fit::AheadFunction ahead(const Unknowns& unknowns, const RecordSet& records) {
   return [&](const std::vector<Eigen::VectorXd>& points) {
@@ -148,6 +137,17 @@ void allow_for_left(signal::LeastSquaresFit& fit, Eigen::Index rows, double left
 }
 
 }  // namespace
+
+Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& p) {
+  const Machine machine = unknowns.machine(p);
+  Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
+  const Eigen::Index own = rows.size();
+  rows.conservativeResize(own + unknowns.size() + Eigen::Index(machine.priors.size()));
+  rows.segment(own, unknowns.size()) = unknowns.prior(p);
+  for (std::size_t i = 0; i < machine.priors.size(); ++i)
+    rows[own + unknowns.size() + Eigen::Index(i)] = machine.priors[i](machine.rig);
+  return rows;
+}
 
 double farthest_logarithm() {
   return 3 * std::log(kFarthest);
@@ -248,6 +248,20 @@ Eigen::VectorXd RecordSet::rows(const model::Rig& rig, const std::vector<Calibra
   return rows;
 }
 
+Eigen::VectorXd RecordSet::rows_of_torque(const std::vector<std::vector<double>>& torque) const {
+  std::vector<std::vector<double>> smooth = torque;
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    for (std::size_t k = 0; k < smooth[i].size(); ++k)
+      if (records_[i].direction[k] == 0) smooth[i][k] = 0;
+    smooth[i] = signal::low_pass(smooth[i], records_[i].data().interval, records_[i].cutoff);
+  }
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(Eigen::Index(layout_.size()));
+  for (std::size_t i = 0; i < layout_.size(); ++i)
+    if (const Row& r = layout_[i]; !r.deflection && records_[r.record].counts[r.sample])
+      rows[Eigen::Index(i)] = smooth[r.record][r.sample] / weights_[r.record].torque;
+  return rows;
+}
+
 void RecordSet::prepare(const std::vector<Machine>& machines) const {
   for (std::size_t i = 0; i < records_.size(); ++i) {
     std::vector<LoadAsked> asked;
@@ -257,23 +271,28 @@ void RecordSet::prepare(const std::vector<Machine>& machines) const {
   }
 }
 
-Unknowns::Unknowns(const Machine& start)
-    : start_(start),
-      delays_(start.largest_delay > 0),
-      offsets_(!start.rig.mesh.rigid && !start.encoders_known),
-      per_record_(std::size_t(delays_) + std::size_t(offsets_)) {}
+Unknowns::Unknowns(const Machine& start) : start_(start) {
+  const double gap = start.rig.mesh.backlash / start.rig.mesh.lever(), place = gap > 0 ? gap : kDefaultGap;
+  if (start.largest_delay > 0)
+    of_record_.push_back({&Calibration::torque_delay, 1, start.largest_delay, start.largest_delay});
+  if (!start.rig.mesh.rigid && !start.encoders_known)
+    of_record_.push_back({&Calibration::encoder_offset, place, kVague * place});
+  if (start.torque_offset > 0)
+    of_record_.push_back({&Calibration::torque_offset, start.torque_offset, start.torque_offset});
+  if (start.encoder_drift > 0)
+    of_record_.push_back({&Calibration::encoder_drift, start.encoder_drift, start.encoder_drift});
+}
 
 Eigen::VectorXd Unknowns::values() const {
   Eigen::VectorXd p = Eigen::VectorXd::Zero(size());
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     if (!start_.parameters[i].positive) p[Eigen::Index(i)] = start_.parameters[i].get(start_.rig);
-  for (std::size_t r = 0; r < records(); ++r) {
-    const Calibration& c = start_.calibrations[r];
-    if (delays_)
-      p[first_of(r)] =
-          start_.largest_delay * std::atanh(std::clamp(c.torque_delay / start_.largest_delay, -0.99, 0.99));
-    if (offsets_) p[first_of(r) + delays_] = c.encoder_offset;
-  }
+  for (std::size_t r = 0; r < records(); ++r)
+    for (std::size_t i = 0; i < of_record_.size(); ++i) {
+      const double value = start_.calibrations[r].*of_record_[i].at, most = of_record_[i].most;
+      p[first_of(r) + Eigen::Index(i)] =
+          std::isinf(most) ? value : most * std::atanh(std::clamp(value / most, -0.99, 0.99));
+    }
   return p;
 }
 
@@ -281,9 +300,9 @@ Eigen::VectorXd Unknowns::scale() const {
   Eigen::VectorXd s = Eigen::VectorXd::Ones(size());
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     if (!start_.parameters[i].positive) s[Eigen::Index(i)] = start_.parameters[i].scale;
-  const double gap = start_.rig.mesh.backlash / start_.rig.mesh.lever();
-  for (std::size_t r = 0; r < records() && offsets_; ++r)
-    s[first_of(r) + delays_] = gap > 0 ? gap : kDefaultGap;
+  for (std::size_t r = 0; r < records(); ++r)
+    for (std::size_t i = 0; i < of_record_.size(); ++i)
+      s[first_of(r) + Eigen::Index(i)] = of_record_[i].scale;
   return s;
 }
 
@@ -299,12 +318,11 @@ model::Rig Unknowns::rig(const Eigen::VectorXd& values) const {
 
 std::vector<Calibration> Unknowns::calibrations(const Eigen::VectorXd& values) const {
   std::vector<Calibration> all = start_.calibrations;
-  for (std::size_t r = 0; r < records(); ++r) {
-    if (delays_) {
-      all[r].torque_delay = start_.largest_delay * std::tanh(values[first_of(r)] / start_.largest_delay);
+  for (std::size_t r = 0; r < records(); ++r)
+    for (std::size_t i = 0; i < of_record_.size(); ++i) {
+      const double value = values[first_of(r) + Eigen::Index(i)], most = of_record_[i].most;
+      all[r].*of_record_[i].at = std::isinf(most) ? value : most * std::tanh(value / most);
     }
-    if (offsets_) all[r].encoder_offset = values[first_of(r) + delays_];
-  }
   return all;
 }
 
@@ -312,7 +330,9 @@ Eigen::VectorXd Unknowns::prior(const Eigen::VectorXd& values) const {
   Eigen::VectorXd sigma = kVague * scale();
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     if (start_.parameters[i].positive) sigma[Eigen::Index(i)] = std::log(kFarthest);
-  for (std::size_t r = 0; r < records() && delays_; ++r) sigma[first_of(r)] = start_.largest_delay;
+  for (std::size_t r = 0; r < records(); ++r)
+    for (std::size_t i = 0; i < of_record_.size(); ++i)
+      sigma[first_of(r) + Eigen::Index(i)] = of_record_[i].deviation;
   return (values - this->values()).cwiseQuotient(sigma);
 }
 
@@ -332,6 +352,18 @@ signal::Measured Unknowns::parameter(const MachineFit& fit, std::size_t i) const
   m.standard_error *= m.value * slope;
   if (fit.reach.size() > 0) m.standard_error = std::max(m.standard_error, fit.reach[Eigen::Index(i)]);
   return m;
+}
+
+std::optional<Eigen::Index> Unknowns::delay(std::size_t record) const {
+  if (!(start_.largest_delay > 0)) return std::nullopt;
+  return first_of(record);
+}
+
+signal::Measured Unknowns::torque_offset(const MachineFit& fit, std::size_t record) const {
+  for (std::size_t i = 0; i < of_record_.size(); ++i)
+    if (of_record_[i].at == &Calibration::torque_offset)
+      return fit.fit.parameter(first_of(record) + Eigen::Index(i));
+  return {fit.machine.calibrations[record].torque_offset, 0};
 }
 
 std::map<std::string, signal::Measured> Unknowns::parameters(const MachineFit& fit) const {

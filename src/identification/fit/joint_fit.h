@@ -2,7 +2,9 @@
 // The unknowns of a machine fitted to several records together (output_error.h says what counts).
 #pragma once
 
+#include <cmath>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,7 +27,9 @@ struct Machine {
   std::vector<Calibration> calibrations;
   /// What is known of the rig beside the records: one more row each, in standard deviations.
   std::vector<std::function<double(const model::Rig&)>> priors = {};
-  double largest_delay = 3;      // samples; approached, never reached; 0: delays are not fitted
+  double largest_delay = 3;  // samples; approached, never reached; 0: delays are not fitted
+  // N m, rad/s: standard deviations of each record's offset of torque and drift of encoder; 0: none is fitted
+  double torque_offset = 0, encoder_drift = 0;
   bool deflection_only = false;  // the torque of the records does not count
   bool encoders_known = false;   // encoder offsets are not fitted
   bool has_map = false;          // a learned map with its many values is among the parameters
@@ -63,6 +67,8 @@ class RecordSet {
   RecordSet of_others(const std::vector<ServoData>& data) const;
 
   Eigen::VectorXd rows(const model::Rig& rig, const std::vector<Calibration>& calibrations) const;
+  /// What a torque [N m] at each sample, beside the motor's, makes of the rows.
+  Eigen::VectorXd rows_of_torque(const std::vector<std::vector<double>>& torque) const;
   /// Simulates them together, which saves time where their rows are asked for next.
   void prepare(const std::vector<Machine>& machines) const;
 
@@ -74,6 +80,7 @@ class RecordSet {
   };
   const std::vector<Row>& layout() const { return layout_; }
   const std::vector<PreparedServo>& records() const { return records_; }
+  const std::vector<Weights>& weights() const { return weights_; }
   /// s, between the samples of one channel that make rows
   double row_interval() const;
 
@@ -98,7 +105,7 @@ double farthest_logarithm();
 class Unknowns {
  public:
   explicit Unknowns(const Machine& start);
-  Eigen::Index size() const { return Eigen::Index(start_.parameters.size() + per_record_ * records()); }
+  Eigen::Index size() const { return Eigen::Index(start_.parameters.size() + of_record_.size() * records()); }
   Eigen::VectorXd values() const;
   Eigen::VectorXd scale() const;
   /// Throws InvalidParameter for values that the rig refuses.
@@ -110,16 +117,27 @@ class Unknowns {
   Machine machine(const Eigen::VectorXd& values) const;
   std::map<std::string, signal::Measured> parameters(const MachineFit& fit) const;
   signal::Measured parameter(const MachineFit& fit, std::size_t i) const;
+  signal::Measured torque_offset(const MachineFit& fit, std::size_t record) const;
+  /// Place of the delay of a record's torque among the values; nothing where it is not fitted.
+  std::optional<Eigen::Index> delay(std::size_t record) const;
 
  private:
   std::size_t records() const { return start_.calibrations.size(); }
   Eigen::Index first_of(std::size_t record) const {
-    return Eigen::Index(start_.parameters.size() + per_record_ * record);
+    return Eigen::Index(start_.parameters.size() + of_record_.size() * record);
   }
   Machine start_;
-  bool delays_, offsets_;
-  std::size_t per_record_;
+  /// What belongs to each record.
+  struct OfRecord {
+    double Calibration::*at;
+    double scale, deviation;  // typical size, standard deviation of the prior
+    double most = INFINITY;   // approached, never reached
+  };
+  std::vector<OfRecord> of_record_;
 };
+
+/// Rows of the records, then of priors.
+Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& values);
 
 MachineFit fit_machine(const Machine& start, const RecordSet& records, fit::NonlinearOptions options);
 
@@ -129,6 +147,15 @@ MachineFit fit_machine(const Machine& start, const RecordSet& records, fit::Nonl
 /// keeps its sign until the next reversal. On a machine that is coupled to other axes the residual also
 /// counts as if it followed each value.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
+
+/// White noise of a motor's position makes its inertia and its viscous friction too small, which the noise
+/// of speed and acceleration says (Fuller 1987, Measurement Error Models, Section 2.2): takes that off, and
+/// counts a part of it as an error. Of a machine with a locked link, whose low-pass leaves little else.
+void correct_for_noise_of_motion(MachineFit& fit, const Machine& start, const RecordSet& records);
+
+/// The values along the delay of the torque by half a sample, by which it is unknown how the torque acts
+/// between its samples.
+void allow_for_hold(MachineFit& fit, const Machine& start);
 
 /// A missing effect (kShowsMissingEffect) may have the same shape as the change of the records by one value;
 /// it then shifts that value and leaves no trace in the residual. So the error of a value is at least the

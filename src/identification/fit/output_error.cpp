@@ -7,7 +7,11 @@
 #include <optional>
 #include <utility>
 
+#include "backlash_diagnosis/model/mesh_resonance.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "calibration.h"
+#include "missing_effects.h"
 #include "multi_start.h"
 #include "valley.h"
 
@@ -24,12 +28,42 @@ std::function<double(const model::Rig&)> prior_row(const Finding& finding) {
   };
 }
 
-Machine start_machine(const model::Rig& rig, std::size_t records, const OutputErrorSettings& settings) {
+constexpr double kFewestPasses = 3;  // theory: in a single one to and fro a drift looks like play
+constexpr double kLockDelay =
+    0.5;  // theory: samples, between a torque that is held and one of the moment; more is an effect
+constexpr double kLockTolerance = 1e-5;  // theory: of 10^3 squares, that of a tenth of a standard error
+
+/// Beside what is asked of a machine with a locked link: damping of the teeth, which is declared and shows
+/// like a delay, offset of the torque, which a preloaded mesh feels, and drift of the encoder.
+void know_lock(Machine& machine, const std::vector<ServoData>& data) {
+  start_in_travel(machine, data);
+  machine.largest_delay = kLockDelay;
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
+    const bool damps =
+        p.kind == rig_file::ParameterKind::damping || p.kind == rig_file::ParameterKind::damping_factor;
+    const double value = p.get(machine.rig);
+    if (!damps || !p.known_to(machine.rig) || !(value > 0)) continue;
+    machine.parameters.push_back(machine_parameter(p.name, machine.rig));
+    machine.priors.emplace_back([get = p.get, value](const model::Rig& rig) {
+      return std::log(get(rig) / value) / kDeclaredUncertainty;
+    });
+  }
+  for (const ServoData& d : data) {
+    const double duration = double(d.size()) * d.interval;
+    machine.torque_offset = std::max(machine.torque_offset, model::usual_torque(d.torque));
+    if (duration > kFewestPasses * time_between_reversals(d))
+      machine.encoder_drift = std::max(machine.encoder_drift, signal::extent(d.motor).size() / duration);
+  }
+}
+
+Machine start_machine(const model::Rig& rig, const std::vector<ServoData>& records,
+                      const OutputErrorSettings& settings, bool locked) {
   Machine machine;
   machine.rig = rig;
-  machine.calibrations.resize(records);
+  machine.calibrations.resize(records.size());
+  if (locked) know_lock(machine, records);
   for (const std::string& name : settings.parameters)
-    machine.parameters.push_back(machine_parameter(name, rig));
+    machine.parameters.push_back(machine_parameter(name, machine.rig));
   if (rig.coupled) machine.priors = rows_as_declared(rig);
   for (const Finding& finding : settings.findings) machine.priors.push_back(prior_row(finding));
   return machine;
@@ -66,8 +100,13 @@ std::optional<BandFit> without_play(const BandFit& fitted, const std::vector<Ser
 
 OutputError fit_output_error(const model::Rig& start, const std::vector<ServoData>& records,
                              const OutputErrorSettings& asked) {
-  const FitSettings settings = with_bands(asked.fit, start, records);
-  BandFit fitted = fit_to_records(records, start_machine(start, records.size(), asked), settings);
+  FitSettings settings = with_bands(asked.fit, start, records);
+  const bool locked = start.link_locked && !asked.parameters.empty();
+  if (locked) {
+    settings.tolerance = kLockTolerance;
+    settings.calibration_delay = kLockDelay;
+  }
+  BandFit fitted = fit_to_records(records, start_machine(start, records, asked, locked), settings);
   const std::map<std::string, double> valley = search_valley(fitted, settings);
   judge_errors(fitted.fit, fitted.start, fitted.records);
   OutputError result;
@@ -77,6 +116,11 @@ OutputError fit_output_error(const model::Rig& start, const std::vector<ServoDat
     result.parameters[play->name] = {0, least.value + least.standard_error};
     fitted = std::move(*other);
   }
+  if (locked) {
+    correct_for_noise_of_motion(fitted.fit, fitted.start, fitted.records);
+    allow_for_hold(fitted.fit, fitted.start);
+    result.lacking = allow_for_effects(fitted.fit, fitted.start, fitted.records);
+  }
   allow_for_misfit(fitted.fit, fitted.records);
   const Machine& machine = fitted.fit.machine;
   result.rig = machine.rig;
@@ -84,6 +128,8 @@ OutputError fit_output_error(const model::Rig& start, const std::vector<ServoDat
     result.parameters[name] = value;
   for (const auto& [name, error] : valley)
     result.parameters.at(name).standard_error = std::hypot(result.parameters.at(name).standard_error, error);
+  for (std::size_t r = 0; r < records.size() && locked; ++r)
+    result.torque_offsets.push_back(Unknowns(fitted.start).torque_offset(fitted.fit, r));
   result.calibrations = machine.calibrations;
   for (std::size_t r = 0; r < records.size(); ++r)
     result.predictions.push_back(predict_servo(machine.rig, records[r], settings, machine.calibrations[r]));

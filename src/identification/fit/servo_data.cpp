@@ -26,6 +26,7 @@ constexpr double kClear = 0.02;  // choice: of the speed: noise that does not hi
 constexpr double kSureSpeed =
     5;  // choice: standard deviations of the speed's noise, from which it has a sign
 constexpr double kWidestBand = 0.2;   // theory: of the sampling rate, up to which differences are derivatives
+constexpr double kReach = 0.3;        // theory: periods of its band that a smooth speed is sharp to
 constexpr double kNarrower = 0.9;     // choice: from one band that is tried to the next
 constexpr double kLeastPeriods = 10;  // choice: of the band, in the record: below, nothing is smoothed
 constexpr double kLoadRateBand = 120 / model::kTriedResonance;  // simulation: in units of the mesh resonance
@@ -118,9 +119,11 @@ void smooth_slow_motion(ServoData& data) {
     const std::vector<double> rate = fast_derivative(smooth, data.interval);
     const double noise = position * rate_of_noise(band, data.interval);
     if (noise > kClear * root_mean_square(rate)) continue;
+    data.recorded_motor = std::move(data.motor);
     data.motor = smooth;
     data.motor_rate = rate;
     data.rate_noise = noise;
+    data.smooth_reach = std::lround(kReach / (band * data.interval));
     return;
   }
 }
@@ -184,6 +187,13 @@ ServoData servo_data(const record::EvenGrid& grid, const model::Rig& rig, double
   data.load_rate_cutoff = resonance > 0 ? std::min(kLoadRateBand * resonance, highest) : highest;
   take_rates_of_load(data);
   return data;
+}
+
+void press_as_recorded(ServoData& data) {
+  if (data.recorded_motor.empty()) return;
+  data.teeth_recorded = true;
+  data.rate_reach += data.smooth_reach;
+  data.motor_acceleration = second_difference(data.recorded_motor, data.interval);
 }
 
 ServoData with_columns(const ServoData& pattern, std::vector<double> torque, std::vector<double> motor,

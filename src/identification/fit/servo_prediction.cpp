@@ -24,7 +24,6 @@ constexpr double kStarts =
     12;  // theory: time constants of the feedback: of the load's start exp(-12) is left
 constexpr double kSureSpeed = 5;  // choice: standard deviations of the motor speed, from which it has a sign
 constexpr double kMemory = 0.5;   // theory: periods of its cutoff that a low-pass mixes
-constexpr long kReach = 2;        // theory: samples to either side that the five-point difference uses
 
 // A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
 // torques are averaged alike: one that is smooth, by Simpson's weights; one that is held from its sample to
@@ -51,7 +50,7 @@ std::vector<int> sliding(const ServoData& data) {
     direction[k] = (data.motor_rate[k] > slowest) - (data.motor_rate[k] < -slowest);
   for (long k = 0; k < n; ++k) {
     sure[k] = direction[k];
-    for (long j = std::max(0L, k - kReach); j <= std::min(n - 1, k + kReach); ++j)
+    for (long j = std::max(0L, k - data.rate_reach); j <= std::min(n - 1, k + data.rate_reach); ++j)
       if (direction[j] != direction[k]) sure[k] = 0;
   }
   return sure;
@@ -83,13 +82,13 @@ ChannelError relative(const std::vector<double>& measured, const std::vector<dou
 /// How a rig's load is driven by a record.
 struct Drive {
   simulation::RecordedMotion motion;
-  double gain = 1;              // of the load encoder
-  double skew = 0;              // samples, by which it is late
-  double offset = 0;            // rad, of the encoders
-  std::vector<double> changed;  // column that is not as recorded
+  double gain = 1;               // of the load encoder
+  double skew = 0;               // samples, by which it is late
+  double offset = 0, drift = 0;  // rad, rad/s, of the encoders
+  std::vector<double> changed;   // column that is not as recorded
 
   Drive(const ServoData& data, const model::Rig& rig, const Calibration& calibration)
-      : offset(calibration.encoder_offset) {
+      : offset(calibration.encoder_offset), drift(calibration.encoder_drift) {
     motion.interval = data.interval;
     motion.motor = &data.motor;
     motion.motor_rate = &data.motor_rate;
@@ -100,9 +99,11 @@ struct Drive {
       motion.load_rate = &data.load_rate;
       motion.first_load = (data.first_load + rig.encoder_skew * data.first_load_rate - offset) / gain;
       motion.first_load_rate = data.first_load_rate / gain;
-    } else if (offset != 0) {
-      changed = data.motor;
-      for (double& position : changed) position += offset;
+    } else if (offset != 0 || drift != 0) {  // of teeth that press, which a low-pass would round off
+      changed = data.teeth_recorded ? data.recorded_motor : data.motor;
+      const double middle = 0.5 * double(changed.size());
+      for (std::size_t k = 0; k < changed.size(); ++k)
+        changed[k] += offset - drift * data.interval * (double(k) - middle);
       motion.motor = &changed;
     }
   }
@@ -119,7 +120,7 @@ struct Drive {
 
 struct SimulatedLoad {
   model::Rig acting;  // of the rig what acts on its load
-  double gain, skew, offset;
+  double gain, skew, offset, drift;
   simulation::DrivenLoad motion;
   std::vector<double> deflection;  // simulated load as shown minus recorded, without offset, low-passed
 };
@@ -137,8 +138,8 @@ namespace {
 std::shared_ptr<const SimulatedLoad> simulated_load(const PreparedServo& record, const Drive& drive,
                                                     const model::Rig& rig, double offset,
                                                     simulation::DrivenLoad motion) {
-  auto made = std::make_shared<SimulatedLoad>(
-      SimulatedLoad{simulation::acting_on_load(rig), drive.gain, drive.skew, offset, std::move(motion), {}});
+  auto made = std::make_shared<SimulatedLoad>(SimulatedLoad{
+      simulation::acting_on_load(rig), drive.gain, drive.skew, offset, drive.drift, std::move(motion), {}});
   if (!simulation::load_moves_freely(rig)) return made;
   const ServoData& data = record.data();
   std::vector<double> difference = signal::delayed(made->motion.load, drive.skew);
@@ -210,7 +211,7 @@ class SimulatedLoads {
     for (auto at = kept_.begin(); at != kept_.end(); ++at) {
       const SimulatedLoad& known = **at;
       if (known.gain != drive.gain || known.skew != drive.skew || known.offset != drive.offset ||
-          !(known.acting == acting))
+          known.drift != drive.drift || !(known.acting == acting))
         continue;
       kept_.splice(kept_.begin(), kept_, at);
       return kept_.front();
@@ -253,7 +254,7 @@ PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, dou
 void PreparedServo::leave_out_lost(bool drawn) {
   const std::vector<bool>& lost = data_->lost;
   const long n = static_cast<long>(lost.size());
-  const long memory = kReach + std::lround(kMemory / (cutoff * data_->interval));
+  const long memory = data_->rate_reach + std::lround(kMemory / (cutoff * data_->interval));
   for (long begin = 0, end = 0; begin < n; begin = end) {
     end = begin + 1;
     if (!lost[std::size_t(begin)]) continue;
@@ -325,7 +326,8 @@ ServoResiduals PreparedServo::residuals(const model::Rig& rig, const Calibration
       r.torque[k] = 0;  // friction takes what balances
       continue;
     }
-    r.predicted_torque[k] = inertia * data().motor_acceleration[k] - motor.mean[k] + friction[k];
+    r.predicted_torque[k] =
+        inertia * data().motor_acceleration[k] - motor.mean[k] + friction[k] + calibration.torque_offset;
     r.torque[k] -= r.predicted_torque[k];
   }
   r.torque = signal::low_pass(r.torque, data().interval, cutoff);

@@ -19,7 +19,8 @@ constexpr double kHardlyMore = 1.1;  // choice: of the sum of squares
 
 /// 1 where the rows distinguish all values, 0 where two are one.
 double flatness(const Eigen::MatrixXd& jacobian) {
-  const Eigen::MatrixXd scaled = jacobian * jacobian.colwise().norm().cwiseInverse().asDiagonal();
+  const Eigen::VectorXd unit = jacobian.colwise().norm().cwiseInverse();
+  const Eigen::MatrixXd scaled = jacobian * unit.asDiagonal();
   const Eigen::MatrixXd normal = scaled.transpose() * scaled;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(normal, Eigen::EigenvaluesOnly);
   return std::sqrt(std::max(0.0, solver.eigenvalues()[0]));

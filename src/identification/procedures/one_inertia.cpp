@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "../fit/missing_effects.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/record/resampling.h"
@@ -19,7 +20,6 @@
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/weighted_mean.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
-#include "missing_effects.h"
 #include "one_inertia_signals.h"
 
 namespace backlash::identification {
@@ -160,9 +160,9 @@ void allow_for_missing(Solution& solution, const Signals& s, const Eigen::Matrix
                        const record::Record& record, double noise) {
   std::vector<Eigen::MatrixXd> effects;
   for (const EffectShapes& effect : likely_effects(moments_of(record, s))) {
-    Eigen::MatrixXd columns(a.rows(), Eigen::Index(effect.size()));
-    for (std::size_t i = 0; i < effect.size(); ++i)
-      columns.col(Eigen::Index(i)) = picked(low_pass_sliding(s, effect[i]), s.used);
+    Eigen::MatrixXd columns(a.rows(), Eigen::Index(effect.shapes.size()));
+    for (std::size_t i = 0; i < effect.shapes.size(); ++i)
+      columns.col(Eigen::Index(i)) = picked(low_pass_sliding(s, effect.shapes[i]), s.used);
     effects.push_back(std::move(columns));
   }
   const Eigen::VectorXd drawn = drawn_by_missing(a, solution.fit.residuals, effects, noise);

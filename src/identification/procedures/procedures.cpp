@@ -32,6 +32,11 @@ signal::Measured known(const IdentificationCase& c, const std::string& name) {
           found == c.result.parameters.end() ? kDeclaredUncertainty * value : found->second.standard_error};
 }
 
+void allow_for_declared(double declared, signal::Measured& fitted) {
+  if (fitted.standard_error > std::fabs(fitted.value))
+    fitted.standard_error = std::hypot(fitted.standard_error, declared - fitted.value);
+}
+
 std::vector<std::string> on_each(const IdentificationCase& c, bool (CaseRecord::*wanted)() const,
                                  const std::function<void(const CaseRecord&)>& body) {
   std::vector<std::string> used, reasons;

@@ -61,6 +61,9 @@ ProcedureReport run_output_error(IdentificationCase& c);
 ProcedureReport run_one_inertia(IdentificationCase& c);
 ProcedureReport run_locked_output(IdentificationCase& c);
 
+/// Throws CannotIdentify where run_locked_output() cannot serve this rig, with the reason.
+void require_locked_output(const model::Rig& rig);
+
 // What the steps share.
 
 std::string plus_minus(const signal::Measured& m, const std::string& unit);
@@ -73,6 +76,10 @@ void add_finding(IdentificationCase& c, const std::string& procedure,
 
 /// A parameter as it is known by now.
 signal::Measured known(const IdentificationCase& c, const std::string& name);
+
+/// A missing effect draws a friction or a damping to zero, where a logarithm has no error to speak of: what
+/// was declared is no less likely.
+void allow_for_declared(double declared, signal::Measured& fitted);
 
 /// Calls `body` on every record that `wanted` accepts and keeps the names of those that it can use; the
 /// reasons of the others make the message of the CannotIdentify where there is none.

@@ -100,15 +100,6 @@ bool lacks_something(const ChannelError& channel) {
   return channel.error > kShowsMissingEffect * channel.floor;
 }
 
-/// A missing effect draws a friction or a damping to zero, where a logarithm has no error to speak of: what
-/// was declared is no less likely.
-void allow_for_declared(const model::Rig& declared, std::map<std::string, signal::Measured>& parameters) {
-  for (auto& [name, measured] : parameters)
-    if (measured.standard_error > std::fabs(measured.value))
-      measured.standard_error =
-          std::hypot(measured.standard_error, rig_file::servo_parameter(name).get(declared) - measured.value);
-}
-
 /// Times the noise, of the channel of which more is left.
 double most_left(const std::map<std::string, ChannelError>& channels) {
   double most = 0;
@@ -228,7 +219,8 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   if (fit.rig.coupled) return report;
   const ChannelError t = c.result.channels["torque"];
   if (lacks_something(d) || lacks_something(t)) {
-    allow_for_declared(c.declared, c.result.parameters);
+    for (auto& [name, value] : c.result.parameters)
+      allow_for_declared(rig_file::servo_parameter(name).get(c.declared), value);
     if (const auto other = with_hertzian_fit(fit, data, settings))
       allow_for_other_teeth(fit, *other, c.result);
     c.result.several = contradicting(c, data, report.records, most_left(c.result.channels), settings);

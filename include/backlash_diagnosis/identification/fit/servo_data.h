@@ -14,14 +14,18 @@ namespace backlash::identification {
 /// All at the load side of the reduction; columns of equal length, empty where the record has no such
 /// channel.
 struct ServoData {
-  double interval = 0;                         // s
-  std::vector<double> torque;                  // N m, of the motor
-  std::vector<double> motor, motor_rate;       // rad, rad/s (five-point difference)
-  std::vector<double> motor_acceleration;      // rad/s^2 (second difference)
-  std::vector<double> smooth_acceleration;     // rad/s^2, of a machine with one inertia: see servo_data()
-  double rate_noise = 0;                       // rad/s, standard deviation of the noise of motor_rate
-  std::vector<double> load, load_rate;         // rad, rad/s (low-passed)
-  double load_rate_cutoff = 0;                 // Hz, of that low-pass
+  double interval = 0;                      // s
+  std::vector<double> torque;               // N m, of the motor
+  std::vector<double> motor, motor_rate;    // rad, rad/s (five-point difference)
+  std::vector<double> recorded_motor;       // rad, before it was smoothed; empty where it was not
+  std::vector<double> motor_acceleration;   // rad/s^2 (second difference)
+  std::vector<double> smooth_acceleration;  // rad/s^2, of a machine with one inertia: see servo_data()
+  long rate_reach = 2;                      // samples to either side that motor_rate is taken from
+  long smooth_reach = 0;                // samples, by which motor_rate is less sharp where it was smoothed
+  bool teeth_recorded = false;          // teeth press where recorded_motor is; see press_as_recorded()
+  double rate_noise = 0;                // rad/s, standard deviation of the noise of motor_rate
+  std::vector<double> load, load_rate;  // rad, rad/s (low-passed)
+  double load_rate_cutoff = 0;          // Hz, of that low-pass
   double first_load = 0, first_load_rate = 0;  // rad, rad/s, from a line through the first samples
   std::vector<bool> lost;  // of each sample: it was not recorded, and lies between its neighbours
   std::size_t size() const { return motor.size(); }
@@ -52,6 +56,10 @@ double time_between_reversals(const ServoData& data);
 ServoData servo_data(const record::Record& record, const model::Rig& rig, double usual_torque = 0);
 /// Of one that is evenly sampled, with the rows that were lost.
 ServoData servo_data(const record::EvenGrid& record, const model::Rig& rig, double usual_torque = 0);
+
+/// Teeth that press, and the acceleration, as they were recorded: a low-pass would round them off. Where the
+/// smoothed rate is not sharp it then has no direction.
+void press_as_recorded(ServoData& data);
 
 /// Other columns of a machine whose load moves freely, with bands and noise as in `pattern`.
 ServoData with_columns(const ServoData& pattern, std::vector<double> torque, std::vector<double> motor,

@@ -6,14 +6,19 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "backlash_diagnosis/model/term_columns.h"
+#include "joint_fit.h"
 
 namespace backlash::identification {
 
 /// One effect: torques over time [any unit], a linear combination of which is it.
-using EffectShapes = std::vector<std::vector<double>>;
+struct EffectShapes {
+  std::string id;
+  std::vector<std::vector<double>> shapes;
+};
 
 /// All that the dictionary has (model/term_columns.h), of waves over the position the slow ones; at least one
 /// moment.
@@ -24,7 +29,13 @@ std::vector<EffectShapes> likely_effects(const std::vector<model::JointMoment>& 
 /// shift of x counts by the share that the effect explains; among effects that leave at most twice the best
 /// residual the largest shift is taken. Steps add up. Of what no effect explains a tenth is assumed to follow
 /// A. `noise`: norm of the residuals of a machine that lacks nothing. Each effect has as many rows as A.
+/// `clear` squares, from which an effect counts at all; `named`: those that are added.
 Eigen::VectorXd drawn_by_missing(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
-                                 const std::vector<Eigen::MatrixXd>& effects, double noise);
+                                 const std::vector<Eigen::MatrixXd>& effects, double noise, double clear = 0,
+                                 std::vector<std::size_t>* named = nullptr);
+
+/// The errors of a fit hold how far effects of the dictionary that its machine lacks may have shifted it,
+/// where they are clear. Returns what is clear.
+std::vector<std::string> allow_for_effects(MachineFit& fit, const Machine& start, const RecordSet& records);
 
 }  // namespace backlash::identification
