@@ -52,8 +52,8 @@ class LineReader : public Place {
 /// "'text'", for messages.
 std::string in_quotes(std::string_view text);
 
-/// What loggers write where they have no number: nothing, or nan, inf, infinity, null in any case and with any
-/// sign.
+/// What loggers write where they have no number: nothing, or nan, inf, infinity, null in any case and with
+/// any sign.
 bool is_no_number(std::string_view text);
 
 /// The fields of a line without the spaces around them, as views into it.
