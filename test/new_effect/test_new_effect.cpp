@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/changes/changes.h"
 #include "backlash_diagnosis/identification/effects/effect_search.h"
 #include "backlash_diagnosis/identification/procedures/one_inertia.h"
-#include "identification/procedures/missing_effects.h"
+#include "identification/fit/missing_effects.h"
 #include "new_effect/eddy_current_brake.h"
 #include "support/servo.h"
 
@@ -148,7 +148,8 @@ TEST(NewEffect, WidensTheErrorsOfAFitThatLacksIt) {
       const double critical = share * std::sqrt((0.2 * 0.2 + 1 + 1.5 * 1.5) / 3);
       bool same = true;
       for (std::size_t k = 0; k < moments.size(); ++k)
-        same &= std::fabs(effect[0][k] - test::eddy_current_torque(1, critical, moments[k].speed)) < 1e-12;
+        same &=
+            std::fabs(effect.shapes[0][k] - test::eddy_current_torque(1, critical, moments[k].speed)) < 1e-12;
       listed |= same;
     }
   EXPECT_TRUE(listed);

@@ -183,10 +183,6 @@ std::vector<model::JointMoment> moments_of(const PreparedServo& record, const st
   return all;
 }
 
-}  // namespace
-
-namespace {
-
 /// How far values move beside these effects where they are fitted as well, by the slopes at the fit.
 Eigen::VectorXd moved_beside(const MachineFit& fit, const Machine& start, const RecordSet& records,
                              const std::vector<Eigen::MatrixXd>& effects) {
