@@ -25,6 +25,7 @@ const std::set<std::pair<std::string, std::string>> kOtherMeanings = {
     {"delay", "src/arm_findings/arm_report.cpp"},                // of a joint's current, a key of its JSON
     {"delay", "src/arm/arm_rig.cpp"},                            // the same in the rig file of an arm
     {"gravity", "src/arm/arm_rig.cpp"},                          // where it points, a key there
+    {"gravity", "src/arm_findings/identified_mjcf.cpp"},         // the same in a file of MuJoCo
     {"friction_drift", "src/arm/trace.cpp"},                     // an arm has no terms: the effect of a joint
 };
 
