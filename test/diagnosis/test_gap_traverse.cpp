@@ -163,7 +163,7 @@ TEST(GapTraverse, OneFlankAloneIsNoPlay) {
 // says of it counts, and not that it might be larger still.
 TEST(GapTraverse, AWeightMayLeaveTheOtherFlankLittleTime) {
   Servo servo;
-  servo.load_step = 7e-6, servo.gravity = 160;
+  servo.load_step = 7e-6, servo.gravity = 160, servo.duration = 10;
   GapTraverseSettings settings = declared();
   settings.load_torque = [](double) { return 120.0; };
   for (const bool load : {true, false}) {
