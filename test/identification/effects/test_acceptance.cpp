@@ -75,7 +75,7 @@ TEST_F(Objection, NamesWhatIsTooLittle) {
   Gain held_out = gain_, forward = gain_, blocks = gain_;
   held_out.evidence.gain_held_out = 0.09;  // a machine with one channel: 10 %
   forward.evidence.gain_forward = 0.04;    // and half of that forward in time
-  blocks.evidence.blocks_better = 7;  // of 12: 58 %
+  blocks.evidence.blocks_better = 7;       // of 12: 58 %
   EXPECT_NE(objection_to(held_out).find("9 %, 10 %"), std::string::npos) << objection_to(held_out);
   EXPECT_NE(objection_to(forward).find("4 %, 5 %"), std::string::npos) << objection_to(forward);
   EXPECT_NE(objection_to(blocks).find("7 of 12"), std::string::npos);
