@@ -56,8 +56,8 @@ fit::Priors shared_priors(const TraverseData& data, const GapTraverseSettings& s
                               false};
   p[kTraverseLate] = {"delay of the torque", kHeld, std::max(kKnownHeld, kKnownLag / data.interval), false};
   for (int n = 0; n < kTorqueWaves; ++n)
-    p[std::size_t(kTraverseWave + n)] = {"wave of the motor's torque", 0,
-                                         data.waves[n].empty() ? 0 : kUnexplained * data.level, false};
+    p[std::size_t(kTraverseWave) + std::size_t(n)] = {
+        "wave of the motor's torque", 0, data.waves[n].empty() ? 0 : kUnexplained * data.level, false};
   p[kTraverseSkew] = {"skew of the load's encoder", 0, kSkew, false};
   p[kTraverseZero] = {"zero of the load's encoder", 0, data.width, false};
   p[kTraverseSine] = {"sine of the load encoder's angle", 0, kEccentricity, false};
