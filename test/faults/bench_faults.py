@@ -90,7 +90,7 @@ def two_marks(rng, bench):
 
 def text_in_numbers(rng, bench):
     index, place = rng.randrange(len(bench.rows)), rng.randrange(len(bench.names))
-    wrong = rng.choice(["abc", "", "1 2", "nan", "0x1F", "1e999", "180\u00b0", "2 mA"])
+    wrong = rng.choice(["abc", "1 2", "0x1F", "1e999", "180\u00b0", "2 mA"])
     bench.rows[index][place] = wrong
     return "%r in row %d" % (wrong, index), bench.text().encode(), True, [r"record\.csv:\d+"]
 
