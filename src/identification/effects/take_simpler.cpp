@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Beside the effects that were found later a name with fewer shapes may explain the same: gravity, where
+// Beside the effects that were found later a name with fewer unknowns may explain the same: gravity, where
 // cogging of an order near 1 took a part of them.
 #include <algorithm>
 #include <utility>
 
+#include "found_effects.h"
 #include "steps.h"
 
 namespace backlash::identification {
 namespace {
 
-std::size_t shapes_of(const Candidate& candidate) {
-  const model::TermType& type = model::term_type(candidate.id);
-  return type.search ? candidate.terms.size() * type.search->shapes.size() : 0;
+/// Numbers that a fit of it finds.
+std::size_t unknowns_of(const Candidate& candidate) {
+  std::size_t count = 0;
+  for (std::size_t t = 0; t < candidate.terms.size(); ++t) count += fitted_count(candidate, t);
+  return count;
 }
 
 }  // namespace
@@ -21,7 +24,7 @@ Hypothesis take_simpler(const Hypothesis& before, const SearchContext& context) 
   for (std::size_t i = 0; i < h.effects.size(); ++i) {
     const Effect now = h.effects[i];
     for (std::size_t k = 0; k < now.alternatives.size(); ++k) {
-      if (shapes_of(now.alternatives[k]) >= shapes_of(now.candidate)) continue;
+      if (unknowns_of(now.alternatives[k]) >= unknowns_of(now.candidate)) continue;
       context.report("trying " + now.alternatives[k].id + " instead of " + now.candidate.id);
       std::vector<Effect> effects = h.effects;
       std::swap(effects[i].candidate, effects[i].alternatives[k]);

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What every machine has some of, and no rig file states: how friction builds up after a reversal, a torque
 // whose zero is not quite zero.
-#include <algorithm>
 #include <cmath>
 
-#include "backlash_diagnosis/simulation/driven_load.h"
-#include "effect_roles.h"
 #include "steps.h"
 
 namespace backlash::identification {
+
 double usual_strength(const model::TermType& type, const model::Rig& rig) {
   return type.usual_of_friction * rig.motor.coulomb_friction +
          type.usual_of_gap * rig.mesh.backlash / rig.mesh.lever();

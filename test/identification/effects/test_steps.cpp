@@ -126,7 +126,7 @@ TEST(WithoutEffect, LeavesTheOthersFitted) {
   EXPECT_GT(size(without_effect(*both, 1, bench.context)), 2);
 }
 
-TEST(TakeSimpler, TakesTheNameWithFewerShapesWhereThatExplainsTheSame) {
+TEST(TakeSimpler, TakesTheNameWithFewerUnknownsWhereThatExplainsTheSame) {
   Effect wave = cogging_effect(0.8, 1, 0.6);
   wave.alternatives = {{"gravity", {{{"amplitude", 0.8}, {"phase", 0.6}}}}};
   OneInertiaMachine weight;
@@ -144,6 +144,22 @@ TEST(TakeSimpler, TakesTheNameWithFewerShapesWhereThatExplainsTheSame) {
   const auto right = refitted(fit_declared(test::one_inertia_rig(), teeth.context), {wave}, teeth.context);
   ASSERT_TRUE(right);
   EXPECT_EQ(ids(take_simpler(*right, teeth.context)), std::vector<std::string>{"cogging"});
+}
+
+// Friction that follows the load has shapes that are 0 until they are asked for: one unknown, not three as a
+// wave has.
+TEST(TakeSimpler, ShapesThatAreNotFittedDoNotCount) {
+  Effect load;
+  load.candidate = {"load_dependent_friction",
+                    {{{"coefficient", 0.1}, {"fluctuation", 0}, {"fluctuation_speed", 0}}}};
+  load.candidate.terms[0].set_choice("body", "motor");
+  Candidate wave = {"position_dependent_friction", {{{"amplitude", 0.3}, {"order", 1}, {"phase", 0.6}}}};
+  wave.terms[0].set_choice("body", "motor");
+  load.alternatives = {wave};
+  const SearchBench bench{with_cogging()};
+  Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  h.effects = {load};  // as if fitted: any fit that is tried would take its place
+  EXPECT_EQ(ids(take_simpler(h, bench.context)), std::vector<std::string>{"load_dependent_friction"});
 }
 
 TEST(OtherTeeth, AreAsStiffAndDampedUnderTheSameTorque) {
