@@ -29,15 +29,23 @@ bool all_finite(const std::vector<double>& x);
 /// "3 samples", "1 sample"
 std::string counted(std::size_t count, const std::string& noun);
 
+bool is_torque(Channel channel);
+
 constexpr std::array<Channel, 2> kEncoders = {Channel::motor_position, Channel::load_position};
 
-/// Lost samples, repeated stamps, steps of the clock. Makes stamps even where they alone jitter.
+/// Lost samples, repeated stamps, steps of the clock.
 void check_stamps(RecordLook& look);
+
+/// Makes stamps even where they alone jitter: after all that would look like late samples is gone or cut.
+void check_jitter(RecordLook& look);
 
 /// Samples of two sources in turn; positions that were taken modulo a turn, which are unwrapped.
 void check_turns(RecordLook& look);
 
-/// Steps of positions that no speed makes; single wild samples are dropped.
+/// Single samples of a position or torque that are off by far and back at once: they count as lost.
+void check_wild(RecordLook& look);
+
+/// Steps of positions that no speed makes.
 void check_steps(RecordLook& look);
 
 /// Samples from `begin` to before `end` stand still `while_what`: said once, and cut.

@@ -98,12 +98,6 @@ double shared(const std::vector<bool>& rows, const std::vector<bool>& others) {
   return double(both) / double(count);
 }
 
-bool is_torque(Channel channel) {
-  return channel == Channel::motor_torque || channel == Channel::sensor_torque ||
-         channel == Channel::output_torque || channel == Channel::motor_current ||
-         channel == Channel::acceleration;
-}
-
 void look_at_held(RecordLook& look, ChannelState& state) {
   const std::vector<double>& x = look.record.column(state.channel);
   if (state.channel == Channel::reference_position) return;  // is set when it is set
@@ -211,6 +205,12 @@ std::vector<double> travelled(const std::vector<double>& time, const std::vector
 }
 
 }  // namespace
+
+bool is_torque(Channel channel) {
+  return channel == Channel::motor_torque || channel == Channel::sensor_torque ||
+         channel == Channel::output_torque || channel == Channel::motor_current ||
+         channel == Channel::acceleration;
+}
 
 void cut_frozen(RecordLook& look, Channel channel, std::size_t begin, std::size_t end,
                 const std::string& while_what) {

@@ -55,29 +55,10 @@ std::string describe(const Lost& lost, const std::vector<double>& time) {
              lost.places, time[lost.first], lost.most, time[lost.most_after]);
 }
 
-void look_at_jitter(RecordLook& look, const std::vector<std::size_t>& rows) {
-  std::vector<double>& t = look.record.time;
-  double squares = 0;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i + 1 < t.size(); ++i) {
-    if (rows[i + 1] - rows[i] > 1) continue;
-    squares += std::pow((t[i + 1] - t[i]) / look.interval - 1, 2);
-    ++count;
-  }
-  look.out.stamps.jitter = count > 0 ? std::sqrt(squares / double(count)) : 0;
-  const bool seen = std::any_of(kEncoders.begin(), kEncoders.end(),
-                                [&](Channel channel) { return look.record.has(channel); });
-  if (look.out.stamps.jitter < kJitters || !seen) return;
-  SamplingTimes times = sampling_times(look.record);
-  look.out.stamps.of_stamps_only = times.stamped < 0.5;
-  look.out.stamps.unsure = times.unsure / look.interval;
-  if (look.declared.shares_stamps) return;
-  double moved = 0;
-  for (std::size_t i = 0; i < t.size(); ++i) moved += std::pow(times.time[i] - t[i], 2) / double(t.size());
-  if (std::sqrt(moved) > kOnGrid * look.interval) return;  // a clock that drifts: stamps stay as they are
-  look.out.stamps.evened = times.stamped < 1;
-  t = std::move(times.time);
-  look.record.unsure_time = times.unsure;
+/// A cut begins and ends at samples, whose times move.
+void move(double& at, const std::vector<double>& from, const std::vector<double>& to) {
+  const auto sample = std::lower_bound(from.begin(), from.end(), at);
+  if (sample != from.end() && *sample == at) at = to[std::size_t(sample - from.begin())];
 }
 
 }  // namespace
@@ -120,7 +101,37 @@ void check_stamps(RecordLook& look) {
              look.record.first_repeated_stamp, look.record.repeated_stamps, Consequence::mended,
              fmt::format("{} repeated, the first at {:.6g} s: the later samples are left out",
                          counted(look.record.repeated_stamps, "stamp"), look.record.first_repeated_stamp));
-  look_at_jitter(look, rows);
+}
+
+void check_jitter(RecordLook& look) {
+  const std::vector<double> stamps = look.record.time;
+  const std::vector<std::size_t> rows = rows_of_samples(stamps, look.interval);
+  double squares = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i + 1 < stamps.size(); ++i) {
+    if (rows[i + 1] - rows[i] > 1) continue;
+    squares += std::pow((stamps[i + 1] - stamps[i]) / look.interval - 1, 2);
+    ++count;
+  }
+  look.out.stamps.jitter = count > 0 ? std::sqrt(squares / double(count)) : 0;
+  const bool seen = std::any_of(kEncoders.begin(), kEncoders.end(),
+                                [&](Channel channel) { return look.record.has(channel); });
+  if (look.out.stamps.jitter < kJitters || !seen) return;
+  SamplingTimes times = sampling_times(look.record, look.cuts);
+  look.out.stamps.of_stamps_only = times.stamped < 0.5;
+  look.out.stamps.unsure = times.unsure / look.interval;
+  if (look.declared.shares_stamps) return;
+  double moved = 0;
+  for (std::size_t i = 0; i < stamps.size(); ++i)
+    moved += std::pow(times.time[i] - stamps[i], 2) / double(stamps.size());
+  if (std::sqrt(moved) > kOnGrid * look.interval) return;  // a clock that drifts: stamps stay as they are
+  look.out.stamps.evened = times.stamped < 1;
+  look.record.time = std::move(times.time);
+  look.record.unsure_time = times.unsure;
+  for (Stretch& cut : look.cuts)
+    for (double* at : {&cut.from, &cut.to}) move(*at, stamps, look.record.time);
+  for (Jump& jump : look.out.jumps)
+    for (double* at : {&jump.before, &jump.after}) move(*at, stamps, look.record.time);
 }
 
 }  // namespace backlash::record

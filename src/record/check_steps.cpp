@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/record/numbers.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "check_parts.h"
@@ -18,7 +19,8 @@ constexpr double kShape = 0.3;  // choice: of J, by which its neighbours may dif
 constexpr double kStandsOut =
     10;                        // choice: so many times what the other samples show; measured records: below 4
 constexpr double kRare = 500;  // choice: one of so many samples may be wrong
-constexpr std::size_t kFewest = 30;   // choice: of samples that are left out when the others are looked at
+constexpr double kSpoils = 4;  // theory: values of the excess that one wild sample takes part in
+constexpr std::size_t kFewest = 30;   // choice: of values that are left out when the others are looked at
 constexpr double kSteps = 4;          // theory: steps of the sensor; rounding makes up to two
 constexpr std::size_t kSoon = 5;      // choice: samples in which a motion that goes on is seen
 constexpr std::size_t kShortest = 3;  // choice: samples that a wild value may last
@@ -47,7 +49,7 @@ double usual_size(const std::vector<double>& excess) {
   std::vector<double> sizes;
   sizes.reserve(excess.size());
   for (const double e : excess) sizes.push_back(std::fabs(e));
-  const std::size_t leave = std::max(kFewest, std::size_t(double(sizes.size()) / kRare));
+  const std::size_t leave = std::max(kFewest, std::size_t(kSpoils * double(sizes.size()) / kRare));
   const auto place = sizes.end() - std::ptrdiff_t(std::min(leave, sizes.size() - 1)) - 1;
   std::nth_element(sizes.begin(), place, sizes.end());
   return *place;
@@ -112,16 +114,6 @@ void say_jumps(RecordLook& look, const std::vector<Jump>& jumps) {
             name, jump.size.value, jump.before));
 }
 
-/// The line between the samples to either side.
-void bridge(std::vector<double>& x, const std::vector<double>& time, std::size_t before, std::size_t after) {
-  for (std::size_t i = before + 1; i < after; ++i)
-    x[i] = x[before] + (x[after] - x[before]) * (time[i] - time[before]) / (time[after] - time[before]);
-}
-
-struct Wild {
-  std::size_t samples = 0, first = 0;
-};
-
 /// The value before a jump repeats for long, and behind it the position goes on at once: it moved all the
 /// while. Where it begins to repeat, else i.
 std::size_t begin_of_frozen(const std::vector<double>& x, std::size_t i, double quantum) {
@@ -132,50 +124,76 @@ std::size_t begin_of_frozen(const std::vector<double>& x, std::size_t i, double 
   return i + 1 - begin >= kLongRun && goes_on ? begin : i;
 }
 
-/// Takes single wild samples out, returns the jumps that are left.
-std::vector<Jump> look_at(RecordLook& look, Channel channel, Wild& wild) {
-  std::vector<double>& x = look.record.column(channel);
-  const std::vector<double>& t = look.record.time;
+/// What stands out of what is usual.
+double least_excess(const std::vector<double>& x, const std::vector<double>& excess) {
+  return std::max(kStandsOut * usual_size(excess), kSteps * signal::smallest_step(x));
+}
+
+std::vector<std::size_t> wild_rows(const RecordLook& look, Channel channel) {
+  const std::vector<double>&x = look.record.column(channel), &t = look.record.time;
   const std::vector<double> excess = excess_of(t, x);
-  const double usual = std::max(usual_size(excess), signal::smallest_step(x));
-  const double least = std::max(kStandsOut * usual_size(excess), kSteps * signal::smallest_step(x));
-  std::vector<Jump> jumps;
+  const double least = least_excess(x, excess);
+  std::vector<std::size_t> wild;
   for (std::size_t i = 1; i + 2 < x.size(); ++i) {
     if (std::fabs(excess[i]) < least * longer(look, i)) continue;
-    if (const std::size_t end = end_of_wild(x, t, i, least); end > i) {
-      if (wild.samples == 0) wild.first = i + 1;
-      wild.samples += end - i;
-      bridge(x, t, i, end + 1);
-      i = end + 1;
-    } else if (!has_shape(excess, i)) {
-      continue;
-    } else if (const std::size_t begin = begin_of_frozen(x, i, signal::smallest_step(x)); begin < i) {
+    const std::size_t end = end_of_wild(x, t, i, least);
+    if (end == i) continue;
+    while (i < end) wild.push_back(++i);
+    ++i;
+  }
+  return wild;
+}
+
+std::vector<Jump> jumps_of(RecordLook& look, Channel channel) {
+  const std::vector<double>&x = look.record.column(channel), &t = look.record.time;
+  const std::vector<double> excess = excess_of(t, x);
+  const double usual = std::max(usual_size(excess), signal::smallest_step(x)),
+               least = least_excess(x, excess);
+  std::vector<Jump> jumps;
+  for (std::size_t i = 1; i + 2 < x.size(); ++i) {
+    if (std::fabs(excess[i]) < least * longer(look, i) || !has_shape(excess, i)) continue;
+    if (const std::size_t begin = begin_of_frozen(x, i, signal::smallest_step(x)); begin < i)
       cut_frozen(look, channel, begin, i + 1, fmt::format("and then jumps on by {:.4g}", excess[i]));
-    } else {
+    else
       jumps.push_back({channel, t[i], t[i + 1], size_of(look, channel, i, {excess[i], usual})});
-    }
   }
   return jumps;
 }
 
+bool can_be_looked_at(const std::vector<double>& x) {
+  return !x.empty() && all_finite(x);
+}
+
+void leave_out(RecordLook& look, Channel channel, const std::vector<std::size_t>& wild) {
+  const std::string& name = channel_name(channel);
+  const double first = look.record.time[wild.front()];
+  look.say(
+      FindingKind::jump, name, first, look.record.time[wild.back()], wild.size(), Consequence::mended,
+      fmt::format("{}: {} off by far and back at once, the first at {:.6g} s: they count as lost samples",
+                  name, counted(wild.size(), "sample"), first));
+  for (const std::size_t row : wild) look.record.column(channel)[row] = std::nan("");
+}
+
 }  // namespace
+
+void check_wild(RecordLook& look) {
+  for (const Channel channel : kChannels) {
+    const bool encoder = std::count(kEncoders.begin(), kEncoders.end(), channel) > 0;
+    if (!encoder && !is_torque(channel)) continue;
+    if (!can_be_looked_at(look.record.column(channel))) continue;
+    const std::vector<std::size_t> wild = wild_rows(look, channel);
+    if (!wild.empty()) leave_out(look, channel, wild);
+  }
+  if (!look.declared.shares_stamps) keep_rows_with_numbers({&look.record});
+}
 
 void check_steps(RecordLook& look) {
   for (const Channel channel : kEncoders) {
-    if (look.record.column(channel).empty() || !all_finite(look.record.column(channel))) continue;
-    Wild wild;
-    const std::vector<Jump> jumps = look_at(look, channel, wild);
+    if (!can_be_looked_at(look.record.column(channel))) continue;
+    const std::vector<Jump> jumps = jumps_of(look, channel);
     say_jumps(look, jumps);
     for (const Jump& jump : jumps) look.cuts.push_back({jump.after, jump.after});
     look.out.jumps.insert(look.out.jumps.end(), jumps.begin(), jumps.end());
-    if (wild.samples == 0) continue;
-    const std::string& name = channel_name(channel);
-    const double first = look.record.time[wild.first];
-    look.say(FindingKind::jump, name, first, first, wild.samples, Consequence::mended,
-             fmt::format(
-                 "{}: {} off by far and back at once, the first at {:.6g} s: in their place stands the line "
-                 "between their neighbours",
-                 name, counted(wild.samples, "sample"), first));
   }
 }
 

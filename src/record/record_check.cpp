@@ -57,8 +57,10 @@ CheckedRecord check_record(Record record, const DeclaredMotion& declared) {
   RecordLook look{r, declared, checked.check, r.sampling_interval(), {}};
   check_stamps(look);
   check_dead(look);
+  if (checked.check.refusal() == nullptr) check_wild(look);
   if (checked.check.refusal() == nullptr) check_turns(look);
   if (checked.check.refusal() == nullptr) check_steps(look);
+  check_jitter(look);
   check_repeats(look);
   checked.check.usable = between(r, look.cuts);
   if (checked.check.refusal() == nullptr && !checked.check.usable.empty()) check_sense(look);

@@ -136,16 +136,19 @@ SamplingTimes settled(const Record& record, const SampleGrid& g) {
 
 }  // namespace
 
-SamplingTimes sampling_times(const Record& record) {
+SamplingTimes sampling_times(const Record& record, const std::vector<Stretch>& cuts) {
   const bool known = !std::isnan(record.unsure_time);
   if (known || record.size() < kOfCubic) return {record.time, 1, known ? record.unsure_time : 0};
-  const std::optional<SampleGrid> grid = grid_of(record.time, record.sampling_interval());
+  std::optional<SampleGrid> grid = grid_of(record.time, record.sampling_interval());
   if (!grid) return {record.time, 1, 0};
   if (grid->off < kEven) {
     SamplingTimes even;
     for (const std::size_t row : grid->row) even.time.push_back(grid->time[row]);
     return even;
   }
+  for (std::size_t i = 0; i < record.size(); ++i)
+    for (const Stretch& cut : cuts)
+      if (record.time[i] >= cut.from && record.time[i] <= cut.to) grid->lost[grid->row[i]] = true;
   return settled(record, *grid);
 }
 

@@ -8,6 +8,7 @@
 
 #include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/record/record_check.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash::record {
 namespace {
@@ -173,19 +174,30 @@ TEST(RecordCheck, FindsAJumpWithItsSizeAndCutsThere) {
   }
 }
 
-TEST(RecordCheck, PutsALineInPlaceOfAWildSample) {
+TEST(RecordCheck, LosesTheRowOfAWildSample) {
+  for (const Channel channel : {Channel::motor_position, Channel::motor_torque}) {
+    Record r = healthy();
+    const double off = 20 * signal::peak_to_peak(r.column(channel));
+    for (const std::size_t row : {1000, 3000, 3001, 5000}) r.column(channel)[row] += off;
+    const CheckedRecord checked = check_record(r, servo());
+    const Finding* const wild = find(checked.check, FindingKind::jump);
+    ASSERT_NE(wild, nullptr);
+    EXPECT_EQ(wild->consequence, Consequence::mended);
+    EXPECT_EQ(wild->count, 4u);
+    EXPECT_TRUE(checked.check.jumps.empty());
+    ASSERT_EQ(checked.record.size(), r.size() - 4);
+    EXPECT_EQ(checked.record.time[3000 - 1], r.time[3002]);
+    EXPECT_EQ(checked.record.column(channel)[3000 - 1], r.column(channel)[3002]);
+  }
+}
+
+// One sample of 500 (kRare), each at its own distance.
+TEST(RecordCheck, LosesOneWildSampleOf500) {
   Record r = healthy();
-  r.column(Channel::motor_position)[3000] += 1;
-  r.column(Channel::motor_position)[3001] += 1;
-  const CheckedRecord checked = check_record(r, servo());
-  const Finding* const wild = find(checked.check, FindingKind::jump);
-  ASSERT_NE(wild, nullptr);
-  EXPECT_EQ(wild->consequence, Consequence::mended);
-  EXPECT_EQ(wild->count, 2u);
-  EXPECT_TRUE(checked.check.jumps.empty());
-  EXPECT_NEAR(checked.record.column(Channel::motor_position)[3000],
-              healthy().column(Channel::motor_position)[3000],
-              1e-4);  // a curve of 10 rad/s^2 leaves a line by 3e-5 rad in three samples
+  const std::size_t count = r.size() / 500;
+  for (std::size_t i = 0; i < count; ++i)
+    r.column(Channel::load_position)[250 + 500 * i] += i % 2 == 0 ? 0.5 : -0.3;
+  EXPECT_EQ(check_record(r, servo()).record.size(), r.size() - count);
 }
 
 TEST(RecordCheck, UnwrapsTurnsAndCounters) {

@@ -41,7 +41,8 @@ struct SamplingTimes {
 /// Samples are taken late, or stamped late, or both. A position shows which: its sample is off by the rate
 /// times what it was late. Taken as the mean that this leaves, between an even base (the stamps alone jitter)
 /// and the stamps. Where Record::unsure_time is known the times of the record are these.
-SamplingTimes sampling_times(const Record& record);
+/// What spans a cut [s] shows nothing.
+SamplingTimes sampling_times(const Record& record, const std::vector<Stretch>& cuts = {});
 
 /// A record that is even to a thousandth of an interval is returned as it is, with rows for lost samples.
 /// Others are interpolated between sampling_times(); Record::unsure_time is what is unknown of them. A record

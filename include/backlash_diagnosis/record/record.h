@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <string>
@@ -45,6 +46,12 @@ extern const std::array<Channel, 8> kBacklashChannels;
 /// One sample of all channels; NaN where there is none.
 using ChannelValues = std::array<double, kChannelCount>;
 
+/// from <= time < to, s
+struct Stretch {
+  double from = 0, to = 0;
+  double duration() const { return to - from; }
+};
+
 /// A record: `time` in seconds, strictly increasing, and one column of the same length per channel present.
 class Record {
  public:
@@ -58,7 +65,14 @@ class Record {
   /// (record/even_grid.h).
   double unsure_time = std::numeric_limits<double>::quiet_NaN();
 
+  /// s, where the recording began of which this is a slice; NaN: it is whole.
+  double whole_from = std::numeric_limits<double>::quiet_NaN();
+
   std::size_t size() const { return time.size(); }
+
+  /// s, from the beginning of the recording to the first sample.
+  double start() const { return std::isnan(whole_from) || time.empty() ? 0 : time.front() - whole_from; }
+
   bool has(Channel channel) const { return !column(channel).empty(); }
 
   /// Values of a channel; empty when the record does not have it.

@@ -41,12 +41,6 @@ struct Jump {
   signal::Measured size;         // rad
 };
 
-/// from <= time < to, s
-struct Stretch {
-  double from = 0, to = 0;
-  double duration() const { return to - from; }
-};
-
 struct RecordCheck {
   StampState stamps;
   std::vector<ChannelState> channels;  // of those that the record has, in their order
@@ -59,7 +53,7 @@ struct RecordCheck {
 };
 
 struct CheckedRecord {
-  Record record;  // with wrapped positions unwrapped, single wild samples replaced and even stamps where only
+  Record record;  // with wrapped positions unwrapped, rows of wild samples lost and even stamps where only
                   // the stamps jitter
   RecordCheck check;
 };
