@@ -98,6 +98,7 @@ Record Record::slice(double from, double to) const& {
   part.repeated_stamps = repeated_stamps;
   part.first_repeated_stamp = first_repeated_stamp;
   part.unsure_time = unsure_time;
+  part.whole_from = size() > 0 ? time.front() - start() : whole_from;
   part.time.assign(time.begin() + first, time.begin() + last);
   for (const Channel channel : kChannels) {
     const std::vector<double>& all = column(channel);
@@ -108,6 +109,7 @@ Record Record::slice(double from, double to) const& {
 
 Record Record::slice(double from, double to) && {
   const auto [first, last] = places(from, to);
+  if (size() > 0) whole_from = time.front() - start();
   for (const Channel channel : kChannels)
     if (has(channel)) column(channel).resize(static_cast<std::size_t>(last));
   time.resize(static_cast<std::size_t>(last));

@@ -24,6 +24,7 @@ EvenGrid on_grid(const EvenGrid& from, double interval) {
   out.record.name = record.name;
   out.record.warnings = record.warnings;
   out.record.origin = record.origin;
+  out.record.whole_from = record.whole_from;
   std::size_t j = 0;
   for (double t = record.time.front(); t <= record.time.back();
        t = record.time.front() + double(out.record.time.size()) * interval) {

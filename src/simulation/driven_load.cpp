@@ -178,8 +178,12 @@ MotorTorques motor_torques(const model::Rig& rig, const RecordedMotion& motion, 
   } else {
     out.friction.resize(n);
     for (std::size_t k = 0; k < n; ++k) {
-      model::Motion m{double(k) * motion.interval, (*motion.motor)[k], (*motion.motor_rate)[k], load.load[k],
-                      load.load_rate[k],           load.mesh_torque[k]};
+      model::Motion m{motion.start + double(k) * motion.interval,
+                      (*motion.motor)[k],
+                      (*motion.motor_rate)[k],
+                      load.load[k],
+                      load.load_rate[k],
+                      load.mesh_torque[k]};
       if (rig.mesh.rigid)
         out.mesh_torque[k] = m.mesh_torque =
             train.torque_of_load(m, motion.acceleration ? (*motion.acceleration)[k] : 0);

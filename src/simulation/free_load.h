@@ -26,7 +26,7 @@ BACKLASH_LANES Segment segment_after(const RecordedMotion& motion, std::size_t k
   const std::size_t j = std::min(k + 1, q.size() - 1);
   return {{q[k], q[j], motion.interval * w[k], motion.interval * w[j]},
           motion.load_rate ? between(*motion.load_rate, k) : Cubic{0, 0, 0, 0},
-          double(k) * motion.interval,
+          motion.start + double(k) * motion.interval,
           motion.interval};
 }
 

@@ -97,6 +97,15 @@ TEST(Record, SliceKeepsFromUpToButNotTo) {
   EXPECT_EQ(part.warnings, (std::vector<std::string>{"1 time gap"}));
 }
 
+TEST(Record, SliceKnowsWhereTheRecordingBegan) {
+  Record record = small_record();
+  const double begin = record.time.front();
+  EXPECT_EQ(record.start(), 0);
+  EXPECT_EQ(record.slice(1, 3).start(), 1 - begin);
+  EXPECT_EQ(record.slice(1, 100).slice(2, 3).start(), 2 - begin);
+  EXPECT_EQ(std::move(record).slice(2, 100).start(), 2 - begin);
+}
+
 TEST(Record, SliceOutsideOrReversedIsEmpty) {
   const Record record = small_record();
   EXPECT_EQ(record.slice(-1, 100).size(), 5u);

@@ -131,6 +131,26 @@ TEST(DrivenLoad, FrictionOfOneInertiaFollowsWhatItsLoadTakes) {
 }
 
 // Flanks are looked up less often than forces.
+// Friction that drifts is as far in the second part of a record as it was in the whole.
+TEST(DrivenLoad, APartOfARecordRunsOn) {
+  model::Rig rig;
+  rig.mesh.rigid = true;
+  rig.motor.inertia = 1;
+  ParameterValues values = {{"change", 3}, {"span", 2}, {"rate", 1}};
+  values.set_choice("body", "motor");
+  rig.terms.push_back(model::make_term("friction_drift", values));
+  std::vector<double> position, rate(2000, 0.5);
+  for (std::size_t k = 0; k < rate.size(); ++k) position.push_back(5e-4 * double(k));
+  const std::vector<double> later(position.begin() + 1200, position.end()), later_rate(later.size(), 0.5);
+  RecordedMotion whole{1e-3, &position, &rate}, part{1e-3, &later, &later_rate};
+  part.start = 1.2;
+  const auto friction = [&](const RecordedMotion& motion, std::size_t k) {
+    return motor_torques(rig, motion, simulate_driven_load(rig, motion)).friction[k].forward;
+  };
+  for (const std::size_t k : {0, 700}) EXPECT_NEAR(friction(part, k), friction(whole, 1200 + k), 1e-9);
+  EXPECT_NEAR(friction(part, 0), 3 * std::expm1(-1.2) / std::expm1(-2), 1e-9);
+}
+
 TEST(DrivenLoad, RepeatsATrainWithShapedFlanks) {
   model::Rig rig = other_servo();
   const auto error =

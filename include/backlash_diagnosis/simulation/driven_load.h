@@ -31,6 +31,7 @@ struct RecordedMotion {
   double first_load = 0, first_load_rate = 0;       // rad, rad/s: where the load starts
   // rad/s^2 of the motor, smooth, for friction of one inertia that follows what its load takes; null: 0
   const std::vector<double>* acceleration = nullptr;
+  double start = 0;  // s, of the first sample, as terms see it
 };
 
 struct DrivenLoad {

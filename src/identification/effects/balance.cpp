@@ -125,9 +125,8 @@ Balance::Part Balance::part_of(const ServoData& data, const Calibration& calibra
   part.interval = data.interval;
   for (std::size_t k = 0; k < data.size(); ++k) {
     Sample s;
-    s.motion = {double(k) * data.interval, data.motor[k],
-                data.motor_rate[k],        data.load[k] - calibration.encoder_offset,
-                data.load_rate[k],         through[k]};
+    s.motion = {data.start + double(k) * data.interval,    data.motor[k],     data.motor_rate[k],
+                data.load[k] - calibration.encoder_offset, data.load_rate[k], through[k]};
     s.direction = prepared.direction[k];
     if (std::fabs(through[k]) > kPressed * usual) s.side = through[k] > 0 ? 1 : -1;
     slides[k] = s.direction != 0, pressed[k] = s.side != 0;

@@ -193,7 +193,7 @@ model::MotionRange motion_range(const std::vector<ServoData>& records) {
     const auto [low, high] = signal::extent(d.motor);
     range.from = std::min(range.from, low);
     range.to = std::max(range.to, high);
-    range.duration = std::max(range.duration, double(d.size()) * d.interval);
+    range.duration = std::max(range.duration, d.start + double(d.size()) * d.interval);
     range.interval = d.interval;
   }
   if (range.deflection == 0) range.deflection = 0.01 * (range.to - range.from);

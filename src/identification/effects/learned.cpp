@@ -28,7 +28,7 @@ std::vector<double> coordinate(const std::string& name, const RecordSet& records
     if (name == "mesh_torque")
       take(records.records()[i].residuals(machine.rig, machine.calibrations[i]).load->mesh_torque);
     if (name == "time")
-      for (std::size_t k = 0; k < d.size(); ++k) all.push_back(double(k) * d.interval);
+      for (std::size_t k = 0; k < d.size(); ++k) all.push_back(d.start + double(k) * d.interval);
   }
   return all;
 }

@@ -70,7 +70,7 @@ double train_error(const Machine& machine, const std::vector<ServoData>& data, c
 
 TraceSeries trace_series(const ServoData& data, const ServoPrediction& before, const ServoPrediction& after) {
   TraceSeries s;
-  for (std::size_t k = 0; k < data.size(); ++k) s.time.push_back(double(k) * data.interval);
+  for (std::size_t k = 0; k < data.size(); ++k) s.time.push_back(data.start + double(k) * data.interval);
   s.motor_position = data.motor;
   s.motor_velocity = data.motor_rate;
   s.motor_torque = data.torque;

@@ -178,7 +178,8 @@ std::vector<model::JointMoment> moments_of(const PreparedServo& record, const st
     const double speed = d.motor_rate[k];
     way = speed * before < 0 ? 0 : way + std::fabs(speed) * d.interval;
     if (speed != 0) before = speed;
-    all.push_back({double(k) * d.interval, d.motor[k], speed, double(record.direction[k]), load[k], way});
+    all.push_back(
+        {d.start + double(k) * d.interval, d.motor[k], speed, double(record.direction[k]), load[k], way});
   }
   return all;
 }

@@ -165,6 +165,7 @@ ServoData servo_data(const record::EvenGrid& grid, const model::Rig& rig, double
   ServoData data;
   data.lost = grid.lost;
   data.interval = record.sampling_interval();
+  data.start = record.start();
   data.torque = scaled(record, record::Channel::motor_torque, ratio);
   data.motor = scaled(record, record::Channel::motor_position, 1 / ratio);
   data.motor_rate = fast_derivative(data.motor, data.interval);

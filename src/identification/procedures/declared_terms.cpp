@@ -12,6 +12,7 @@ namespace {
 std::vector<double> resistance(const ServoData& data, const model::Rig& rig) {
   simulation::RecordedMotion motion;
   motion.interval = data.interval;
+  motion.start = data.start;
   motion.motor = &data.motor;
   motion.motor_rate = &data.motor_rate;
   motion.acceleration = &data.smooth_acceleration;

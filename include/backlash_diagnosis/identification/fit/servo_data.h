@@ -15,6 +15,7 @@ namespace backlash::identification {
 /// channel.
 struct ServoData {
   double interval = 0;                      // s
+  double start = 0;                         // s, from the beginning of the recording
   std::vector<double> torque;               // N m, of the motor
   std::vector<double> motor, motor_rate;    // rad, rad/s (five-point difference)
   std::vector<double> recorded_motor;       // rad, before it was smoothed; empty where it was not
