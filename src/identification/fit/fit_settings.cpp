@@ -19,16 +19,17 @@ constexpr double kFeedback =
 
 constexpr double kHighestCutoff =
     0.2;                          // theory: of the sampling rate, up to which differences are derivatives
-constexpr double kPeriods = 100;  // choice: in the record: friction has more to say than a slow motion
+constexpr double kPeriods = 100;  // choice: in all records: friction has more to say than a slow motion
 
 /// Hz; of the fastest record.
 double motion_cutoff(const std::vector<ServoData>& data) {
-  double widest = 0;
-  for (const ServoData& d : data)
+  double widest = 0, duration = 0;
+  for (const ServoData& d : data) {
     widest = std::max({widest, signal::motion_bandwidth(d.motor, d.interval),
-                       signal::torque_bandwidth(d.torque, d.motor, d.interval),
-                       kPeriods / (double(d.size()) * d.interval)});
-  return widest;
+                       signal::torque_bandwidth(d.torque, d.motor, d.interval)});
+    duration += double(d.size()) * d.interval;
+  }
+  return std::max(widest, kPeriods / duration);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/presliding.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
+#include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash::identification {
@@ -22,8 +23,10 @@ namespace {
 constexpr double kEnds = 3;  // theory: periods of the cutoff at either end, where the filter has not settled
 constexpr double kStarts =
     12;  // theory: time constants of the feedback: of the load's start exp(-12) is left
-constexpr double kSureSpeed = 5;  // choice: standard deviations of the motor speed, from which it has a sign
-constexpr double kMemory = 0.5;   // theory: periods of its cutoff that a low-pass mixes
+constexpr double kSureSpeed = 5;   // choice: standard deviations of the motor speed, from which it has a sign
+constexpr double kMemory = 0.5;    // theory: periods of its cutoff that a low-pass mixes
+constexpr double kSureJump = 4;    // theory: standard deviations of noise, which hardly any of 10^4 passes
+constexpr double kBridged = 0.05;  // theory: of a period, over which a cubic is off by 2e-4
 
 // A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
 // torques are averaged alike: one that is smooth, by Simpson's weights; one that is held from its sample to
@@ -90,6 +93,7 @@ struct Drive {
   Drive(const ServoData& data, const model::Rig& rig, const Calibration& calibration)
       : offset(calibration.encoder_offset), drift(calibration.encoder_drift) {
     motion.interval = data.interval;
+    motion.start = data.start;
     motion.motor = &data.motor;
     motion.motor_rate = &data.motor_rate;
     if (!data.smooth_acceleration.empty()) motion.acceleration = &data.smooth_acceleration;
@@ -249,19 +253,36 @@ PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, dou
   leave_out_lost(drawn);
 }
 
-/// Left out: what was not recorded, what a low-pass makes of it, and after more than a sample the motion of
-/// the load that was driven by it.
+/// Between the ends of what was lost the positions go on by a cubic, and the torque on a line. Low-passed
+/// that is off by less than the noise of the torque, unless it jumps there: by more than noise it changes
+/// otherwise than beside.
+bool PreparedServo::is_bridged(long begin, long end, double torque_noise) const {
+  const std::vector<double>& torque = data_->torque;
+  if (begin < 2 || end + 1 >= long(torque.size())) return false;
+  const double *first = &torque[std::size_t(begin) - 1], *last = &torque[std::size_t(end)];
+  const double steps = double(end - begin + 1), beside = 0.5 * (first[0] - first[-1] + last[1] - last[0]);
+  const double noise = torque_noise * std::hypot(1 + 0.5 * steps, 0.5 * steps) * std::sqrt(2);
+  const double jump = std::max(0.0, std::fabs(*last - *first - steps * beside) - kSureJump * noise);
+  const double period = cutoff * data_->interval;  // of a sample
+  return steps * period <= kBridged && jump * steps * period <= torque_noise * std::sqrt(2 * period);
+}
+
+/// Left out: what was not recorded, and what a low-pass makes of it. Where teeth drive a load every sample
+/// moves it, and after more than one that was lost its motion is left out too; else short gaps are bridged.
 void PreparedServo::leave_out_lost(bool drawn) {
   const std::vector<bool>& lost = data_->lost;
+  if (std::find(lost.begin(), lost.end(), true) == lost.end()) return;
+  const double noise = signal::noise_from_differences(data_->torque, 4);
   const long n = static_cast<long>(lost.size());
   const long memory = data_->rate_reach + std::lround(kMemory / (cutoff * data_->interval));
   for (long begin = 0, end = 0; begin < n; begin = end) {
     end = begin + 1;
     if (!lost[std::size_t(begin)]) continue;
     while (end < n && lost[std::size_t(end)]) ++end;
-    const long behind =
-        drawn && end - begin > 1 ? std::lround(kStarts / (feedback * data_->interval)) : memory;
-    for (long k = std::max(0L, begin - memory); k < std::min(n, end + behind); ++k)
+    const long before = !drawn && is_bridged(begin, end, noise) ? 0 : memory,
+               behind =
+                   drawn && end - begin > 1 ? std::lround(kStarts / (feedback * data_->interval)) : before;
+    for (long k = std::max(0L, begin - before); k < std::min(n, end + behind); ++k)
       settled[std::size_t(k)] = counts[std::size_t(k)] = 0;
   }
 }

@@ -45,6 +45,7 @@ struct PreparedServo {
   std::vector<char> counts;    // settled, and the motor slides
 
  private:
+  bool is_bridged(long begin, long end, double torque_noise) const;
   void leave_out_lost(bool drawn);
   ServoResiduals coupled_residuals(const model::Rig& rig, const Calibration& calibration) const;
 

@@ -42,7 +42,7 @@ struct FitSettings {
 /// of the mesh resonance (mesh_resonance.h), and no more than 0.2 of the sampling rate:
 ///   cutoff 1.36 f, rough cutoff 0.34 f, feedback 0.18 (2 pi f).
 /// Without a load that moves freely: cutoff is the bandwidth of the motion, and at least 100 periods of it
-/// are in the record. Throws CannotIdentify for records in which nothing moves.
+/// are in the records. Throws CannotIdentify for records in which nothing moves.
 FitSettings with_bands(FitSettings settings, const model::Rig& rig, const std::vector<ServoData>& data);
 
 }  // namespace backlash::identification
