@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "acceptance.h"
 #include "effect_roles.h"
@@ -34,6 +35,13 @@ std::vector<Candidate> alternatives(const Trial& best, double gain, const std::v
   return all;
 }
 
+/// Fitted wholly; `before` where that fails.
+Hypothesis settled(const Hypothesis& with, const Hypothesis& before, const SearchContext& context) {
+  const auto whole = refitted(with, with.effects, context);
+  return whole ? with_best_shapes(*whole, context)
+               : with_rejected(before, with.effects.back().candidate.id, kNotFitted);
+}
+
 }  // namespace
 
 Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
@@ -48,6 +56,7 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
   for (const RejectedEffect& r : trials.rejected) h = with_rejected(std::move(h), r.id, r.reason);
   const HeldOut now =
       held_out(before.fitted->fit, before.fitted->start, records, context.settings.acceptance);
+  std::optional<Hypothesis> vague;  // explains as well with values that the records do not determine
   for (const Trial& best : trials.fitted) {
     const Gain gain = compare(now, held_out_of(best, before, context));
     const std::string reason = objection(gain, best.fit.machine, records, context.settings);
@@ -60,14 +69,14 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
         {best.candidate, gain, alternatives(best, gain.total, trials.fitted, now, before, context), {}, {}});
     auto with = refitted(h, std::move(effects), context, Settled::roughly);
     std::string why = with ? contradicted_by_unseen(*with, context) : kNotFitted;
-    if (why.empty()) {
-      with = refitted(*with, with->effects, context);
-      if (with) return with_best_shapes(*with, context);
-      why = kNotFitted;
-    }
-    h = with_rejected(std::move(h), best.candidate.id, why);
+    if (!why.empty())
+      h = with_rejected(std::move(h), best.candidate.id, why);
+    else if (!last_is_vague(*with, context))
+      return settled(*with, h, context);
+    else if (!vague)
+      vague = with;
   }
-  return h;
+  return vague ? settled(*vague, h, context) : h;
 }
 
 Hypothesis add_effects(const Hypothesis& before, const SearchContext& context) {

@@ -50,26 +50,29 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
   return "";
 }
 
+/// How far a delay is beyond what a held torque may be misjudged, and how well the records show that.
+signal::Measured beyond_hold(const signal::Measured& delay, const SearchContext& context) {
+  const double interval = context.data.front().interval, hold = kUnsureOfHold * interval;
+  return {std::max(0.0, std::fabs(delay.value) - context.settings.fit.calibration_delay * interval),
+          std::sqrt(std::max(0.0, delay.standard_error * delay.standard_error - hold * hold))};
+}
+
 /// The strengths of each effect's terms; none of a map.
-std::vector<std::vector<signal::Measured>> strengths(const Hypothesis& h) {
+std::vector<std::vector<signal::Measured>> strengths(const Hypothesis& h, const SearchContext& context) {
   const std::vector<signal::Measured> all = fitted_values(*h.fitted, h.declared->parameters.size()).effects;
   std::vector<std::vector<signal::Measured>> out;
   std::size_t at = 0;
   for (const Effect& effect : h.effects) {
     out.emplace_back();
     for (std::size_t t = 0; t < effect.candidate.terms.size(); ++t) {
-      if (!model::term_type(effect.candidate.id).map) out.back().push_back(all.at(at));
+      if (is_delay(effect.candidate.id))
+        out.back().push_back(beyond_hold(all.at(at), context));
+      else if (!model::term_type(effect.candidate.id).map)
+        out.back().push_back(all.at(at));
       at += fitted_count(effect.candidate, t);
     }
   }
   return out;
-}
-
-/// How far a delay is beyond what a held torque may be misjudged, and how well the records show that.
-signal::Measured beyond_hold(const signal::Measured& delay, const SearchContext& context) {
-  const double interval = context.data.front().interval, hold = kUnsureOfHold * interval;
-  return {std::max(0.0, std::fabs(delay.value) - context.settings.fit.calibration_delay * interval),
-          std::sqrt(std::max(0.0, delay.standard_error * delay.standard_error - hold * hold))};
 }
 
 /// Does not stand out of its error; an effect of several terms needs one that does.
@@ -91,14 +94,11 @@ std::string other_in_a_part(const StrengthInParts& parts, std::size_t effect) {
 std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis& h, const ServoData& unseen,
                                                                 const SearchContext& context) {
   const BeliefSettings& settings = context.settings.belief;
-  auto all = strengths(h);
   const auto belongs_to_machine = [&](std::size_t i) {
     return simulation::load_moves_freely(h.declared->rig) &&
            is_usual(h.effects[i].candidate, h.declared->rig);
   };
-  for (std::size_t i = 0; i < h.effects.size(); ++i)
-    if (is_delay(h.effects[i].candidate.id))
-      for (signal::Measured& m : all[i]) m = beyond_hold(m, context);
+  const auto all = strengths(h, context);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (!belongs_to_machine(i) && is_vague(all[i], settings.least_z))
       return std::pair{i, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};
@@ -117,6 +117,10 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
 }
 
 }  // namespace
+
+bool last_is_vague(const Hypothesis& h, const SearchContext& context) {
+  return is_vague(strengths(h, context).back(), context.settings.belief.least_z);
+}
 
 std::string contradicted_by_unseen(const Hypothesis& h, const SearchContext& context) {
   const FitSettings& fit = context.settings.fit;

@@ -51,6 +51,8 @@ Hypothesis add_learned(const Hypothesis& h, const SearchContext& context);
 /// No effects where they leave more than they explain: they may be stand-ins for what has no name.
 Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
 
+/// Whether the strength of the last effect does not stand out of its error.
+bool last_is_vague(const Hypothesis& h, const SearchContext& context);
 /// Why the unseen record does not bear out the last effect; empty: it does.
 std::string contradicted_by_unseen(const Hypothesis& h, const SearchContext& context);
 /// Without the effects that the unseen record does not bear out, or whose strength does not stand out of its
