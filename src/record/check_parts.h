@@ -42,7 +42,8 @@ void check_jitter(RecordLook& look);
 /// Samples of two sources in turn; positions that were taken modulo a turn, which are unwrapped.
 void check_turns(RecordLook& look);
 
-/// Single samples of a position or torque that are off by far and back at once: they count as lost.
+/// Single samples of a position that are off by far and back at once, and of a torque that the motor does not
+/// feel: they count as lost.
 void check_wild(RecordLook& look);
 
 /// Steps of positions that no speed makes.

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "backlash_diagnosis/record/numbers.h"
 #include "backlash_diagnosis/signal/least_squares.h"
@@ -129,15 +130,33 @@ double least_excess(const std::vector<double>& x, const std::vector<double>& exc
   return std::max(kStandsOut * usual_size(excess), kSteps * signal::smallest_step(x));
 }
 
+/// Whether the motor accelerates more than usual about the samples from `begin` to `end`.
+class Felt {
+ public:
+  explicit Felt(const RecordLook& look)
+      : excess_(excess_of(look.record.time, look.record.column(Channel::motor_position))),
+        usual_(usual_size(excess_)) {}
+  bool operator()(std::size_t begin, std::size_t end) const {
+    const auto at = excess_.begin() + std::ptrdiff_t(begin) - 1,
+               last = excess_.begin() + std::ptrdiff_t(std::min(end + 2, excess_.size()));
+    return std::any_of(at, last, [&](double e) { return std::fabs(e) > usual_; });
+  }
+
+ private:
+  std::vector<double> excess_;
+  double usual_;
+};
+
 std::vector<std::size_t> wild_rows(const RecordLook& look, Channel channel) {
   const std::vector<double>&x = look.record.column(channel), &t = look.record.time;
   const std::vector<double> excess = excess_of(t, x);
   const double least = least_excess(x, excess);
+  const auto felt = is_torque(channel) ? std::optional(Felt(look)) : std::nullopt;
   std::vector<std::size_t> wild;
   for (std::size_t i = 1; i + 2 < x.size(); ++i) {
     if (std::fabs(excess[i]) < least * longer(look, i)) continue;
     const std::size_t end = end_of_wild(x, t, i, least);
-    if (end == i) continue;
+    if (end == i || (felt && (*felt)(i + 1, end))) continue;
     while (i < end) wild.push_back(++i);
     ++i;
   }
@@ -176,15 +195,19 @@ void leave_out(RecordLook& look, Channel channel, const std::vector<std::size_t>
 
 }  // namespace
 
+/// Positions first: a torque is wild where the motor does not feel it.
 void check_wild(RecordLook& look) {
-  for (const Channel channel : kChannels) {
-    const bool encoder = std::count(kEncoders.begin(), kEncoders.end(), channel) > 0;
-    if (!encoder && !is_torque(channel)) continue;
-    if (!can_be_looked_at(look.record.column(channel))) continue;
-    const std::vector<std::size_t> wild = wild_rows(look, channel);
-    if (!wild.empty()) leave_out(look, channel, wild);
+  for (const bool torques : {false, true}) {
+    if (torques && !can_be_looked_at(look.record.column(Channel::motor_position))) break;
+    for (const Channel channel : kChannels) {
+      const bool encoder = std::count(kEncoders.begin(), kEncoders.end(), channel) > 0;
+      if (!(torques ? is_torque(channel) : encoder)) continue;
+      if (!can_be_looked_at(look.record.column(channel))) continue;
+      const std::vector<std::size_t> wild = wild_rows(look, channel);
+      if (!wild.empty()) leave_out(look, channel, wild);
+    }
+    if (!look.declared.shares_stamps) keep_rows_with_numbers({&look.record});
   }
-  if (!look.declared.shares_stamps) keep_rows_with_numbers({&look.record});
 }
 
 void check_steps(RecordLook& look) {

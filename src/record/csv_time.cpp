@@ -93,7 +93,7 @@ bool RowTimes::accept(double stamp, const std::string& name, std::string_view te
       break;
   }
   place.fail(printable(name) + " = " + in_quotes(text) + ": goes back, the row before has " +
-             to_text(stamps_.last()) + " s");
+             to_text(stamps_.last()) + " s: give what follows as a file of its own");
 }
 
 std::vector<std::string> RowTimes::warnings() const {

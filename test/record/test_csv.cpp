@@ -180,9 +180,14 @@ TEST(Csv, MalformedRowsAreRefusedWithPlaceColumnAndText) {
       {"0,1\n1," + std::string(2 << 20, '1') + "\n", "run.csv:3: line is longer than 1048576 bytes"},
       {"0,1\n1," + std::string(1000, '1') + "\n",
        "run.csv:3: motor_torque = '" + std::string(60, '1') + "...': too large or too small for a double"},
-      {"0,1\n0.25,1\n0.2,1\n", "run.csv:4: time = '0.2': goes back, the row before has 0.25 s"},
-      {"0,1\n1e-3,1\n-1,1\n2,1\n", "run.csv:4: time = '-1': goes back, the row before has 0.001 s"},
-      {"5,1\n5,1\n4,1\n", "run.csv:4: time = '4': goes back, the row before has 5 s"},
+      {"0,1\n0.25,1\n0.2,1\n",
+       "run.csv:4: time = '0.2': goes back, the row before has 0.25 s: give what follows as a file of its "
+       "own"},
+      {"0,1\n1e-3,1\n-1,1\n2,1\n",
+       "run.csv:4: time = '-1': goes back, the row before has 0.001 s: give what follows as a file of its "
+       "own"},
+      {"5,1\n5,1\n4,1\n",
+       "run.csv:4: time = '4': goes back, the row before has 5 s: give what follows as a file of its own"},
       {"5,1\n5,x\n",
        "run.csv:3: motor_torque = 'x': not a number"},  // a row that would be dropped is read too
   };

@@ -141,7 +141,8 @@ TEST(MappedCsv, TimesOfDay) {
     EXPECT_EQ(refusal("t,x\n" + std::string(wrong) + ",0\n", clock("hh:mm:ss")),
               "bench.csv:2: t = '" + std::string(wrong) + "': not a time hh:mm:ss");
   EXPECT_EQ(refusal("t,x\n23:59:59,0\n00:00:00,1\n", clock("hh:mm:ss")),
-            "bench.csv:3: t = '00:00:00': goes back, the row before has 86399 s");
+            "bench.csv:3: t = '00:00:00': goes back, the row before has 86399 s: give what follows as a file "
+            "of its own");
 }
 
 TEST(MappedCsv, TheOwnFormatIsReadAsBefore) {
@@ -191,7 +192,8 @@ TEST(MappedCsv, WhatIsNotPlainlyRightIsRefusedWithItsPlace) {
       {kHeader + "0,60,\"2\"x,180,,\n", "bench.csv:2: a quote that does not enclose a field"},
       {kHeader + "0,60,2,180,,\n\n1,60,2,180,,\n", "bench.csv:3: an empty line amid the data"},
       {kHeader + "2,60,2,180,,\n1,60,2,180,,\n",
-       "bench.csv:3: t [ms] = '1': goes back, the row before has 0.002 s"},
+       "bench.csv:3: t [ms] = '1': goes back, the row before has 0.002 s: give what follows as a file of its "
+       "own"},
       {kHeader + "ms,rpm,mA,deg,,\n0,60,2,180,,\n",
        "bench.csv:2: Iq[A]: unit = 'mA' of channels.motor_torque: is A elsewhere"},
   };

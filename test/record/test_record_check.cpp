@@ -191,6 +191,22 @@ TEST(RecordCheck, LosesTheRowOfAWildSample) {
   }
 }
 
+// A kick of 20000 N m over two samples, as of a speed loop whose target steps: 114 kg m^2 gain 0.7 rad/s.
+TEST(RecordCheck, KeepsATorqueThatTheMotorFeels) {
+  Record r = healthy();
+  for (const std::size_t row : {2000, 4000, 6000}) {
+    r.column(Channel::motor_torque)[row] += 20000, r.column(Channel::motor_torque)[row + 1] += 20000;
+    for (std::size_t k = row; k < r.size(); ++k) {
+      const double since = double(k - row) * kInterval, pulse = 2 * kInterval;
+      const double way = 20000.0 / 114 * (k - row < 2 ? 0.5 * since * since : pulse * (since - 0.5 * pulse));
+      for (const Channel channel : {Channel::motor_position, Channel::load_position})
+        r.column(channel)[k] += way;
+    }
+  }
+  const CheckedRecord checked = check_record(r, servo());
+  EXPECT_EQ(checked.record.size(), r.size()) << messages(checked.check);
+}
+
 // One sample of 500 (kRare), each at its own distance.
 TEST(RecordCheck, LosesOneWildSampleOf500) {
   Record r = healthy();

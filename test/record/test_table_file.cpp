@@ -195,7 +195,8 @@ TEST(TableFile, WhatJsonLacksIsSaidWithItsPlace) {
             "run.json, entry 1: position = 'far': not a number");
   EXPECT_EQ(said("[{\"timestamp\": 1, \"load\": 1, \"position\": 1}, {\"timestamp\": 0, \"load\": 1, "
                  "\"position\": 1}]"),
-            "run.json, entry 2: timestamp = '0': goes back, the row before has 1 s");
+            "run.json, entry 2: timestamp = '0': goes back, the row before has 1 s: give what follows as a "
+            "file of its own");
   EXPECT_EQ(said("[{\"timestamp\": 1, \"load\": 1, \"position\": 1}, 7]"), "run.json, entry 2: is no object");
   EXPECT_EQ(said(R"({"timestamp": [0, 1], "load": [1], "position": [1, 2]})"),
             "run.json: load has 1 values, timestamp has 2");
