@@ -146,17 +146,6 @@ report::Json details_json(const identification::Identification& found) {
                                                          {"speed", run.speed},
                                                          {"inertia", report::measured(run.inertia)}});
   }
-  if (found.speed_calibration)
-    json["sensor_calibration"]["speed"] = {{"scale", report::measured(found.speed_calibration->scale)},
-                                           {"offset", report::measured(found.speed_calibration->offset)}};
-  if (found.position_calibration)
-    json["sensor_calibration"]["position"] = {
-        {"scale", report::measured(found.position_calibration->scale)},
-        {"offset", report::measured(found.position_calibration->offset)},
-        {"play_and_wind_up", report::measured(found.position_calibration->play_and_wind_up)}};
-  for (const identification::CalibrationTrace& trace : found.calibration_traces)
-    json["sensor_calibration"]["traces"].push_back(
-        {{"record", trace.record}, {"motor", trace.motor}, {"difference", trace.difference}});
   if (found.response) json["frequency_response"] = response_json(*found.response);
   if (found.decay) json["decay"] = decay_json(*found.decay);
   if (found.clearance) json["clearance"] = clearance_json(*found.clearance);

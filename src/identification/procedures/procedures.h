@@ -50,7 +50,6 @@ void update_from_findings(IdentificationCase& c);
 
 /// The steps, one file each in this folder.
 ProcedureReport run_encoder_skew(IdentificationCase& c);
-ProcedureReport run_sensor_calibration(IdentificationCase& c);
 ProcedureReport run_friction_lines(IdentificationCase& c);
 ProcedureReport run_line_inertia(IdentificationCase& c);
 ProcedureReport run_frequency_response(IdentificationCase& c);
