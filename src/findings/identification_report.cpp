@@ -101,13 +101,6 @@ report::Json gap_map_json(const identification::GapMap& map) {
     json["harmonics"].push_back({{"order", h.order},
                                  {"amplitude", report::measured(h.amplitude)},
                                  {"phase", report::measured(h.phase)}});
-  for (const identification::GapWave& w : map.waves.waves)
-    json["waves"].push_back({{"order", report::measured(w.order)},
-                             {"pinion", w.pinion},
-                             {"load", w.load},
-                             {"amplitude", report::measured(w.amplitude)},
-                             {"phase", report::measured(w.phase)}});
-  if (!map.waves.waves.empty()) json["turns"] = map.waves.turns;
   for (const identification::GapBin& bin : map.bins)
     json["bins"].push_back({bin.position, bin.separation.value,
                             report::json_number(bin.separation.standard_error), bin.centre.value});

@@ -92,10 +92,8 @@ struct Identification {
 Identification commission(const rig_file::RigFile& file, const std::vector<record::Record>& records);
 
 /// For a rig with two inertias or one (mesh: rigid). Starts from what the rig declares. Throws CannotIdentify
-/// where no procedure can use any record, with all reasons; BadData; Cancelled. `drive` gives the gap map
-/// the orders of its parts.
+/// where no procedure can use any record, with all reasons; BadData; Cancelled.
 Identification identify(const model::Rig& declared, const std::vector<record::Record>& records,
-                        const Progress& progress = nullptr,
-                        const std::optional<rig_file::Drive>& drive = std::nullopt);
+                        const Progress& progress = nullptr);
 
 }  // namespace backlash::identification
