@@ -27,13 +27,6 @@ def friction(axes, lines):
     axes.legend()
 
 
-def calibration(axes, detail):
-    for trace in detail["traces"]:
-        axes.plot(trace["motor"], trace["difference"], linewidth=0.8, label=os.path.basename(trace["record"]))
-    axes.set(title="position sensors, runs one way", xlabel="motor position [rad]", ylabel="motor - load [rad]")
-    axes.legend(fontsize=7)
-
-
 def inertia(axes, detail):
     labels = []
     for subject, found in sorted(detail.items()):
@@ -124,8 +117,6 @@ def panels(data):
     # What a procedure looked at and did not use would look as if it counted.
     unused = {p["name"] for p in data["procedures"] if not p["used"]}
     details, drawn = {key: value for key, value in data["details"].items() if key not in unused}, []
-    if details.get("sensor_calibration", {}).get("traces"):
-        drawn.append((calibration, (details["sensor_calibration"],)))
     for key, draw in (("friction_lines", friction), ("line_inertia", inertia), ("frequency_response", response),
                       ("frequency_response", phase), ("decay", decay), ("clearance", clearance),
                       ("gap_map", gap_map)):

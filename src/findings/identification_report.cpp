@@ -101,13 +101,6 @@ report::Json gap_map_json(const identification::GapMap& map) {
     json["harmonics"].push_back({{"order", h.order},
                                  {"amplitude", report::measured(h.amplitude)},
                                  {"phase", report::measured(h.phase)}});
-  for (const identification::GapWave& w : map.waves.waves)
-    json["waves"].push_back({{"order", report::measured(w.order)},
-                             {"pinion", w.pinion},
-                             {"load", w.load},
-                             {"amplitude", report::measured(w.amplitude)},
-                             {"phase", report::measured(w.phase)}});
-  if (!map.waves.waves.empty()) json["turns"] = map.waves.turns;
   for (const identification::GapBin& bin : map.bins)
     json["bins"].push_back({bin.position, bin.separation.value,
                             report::json_number(bin.separation.standard_error), bin.centre.value});
@@ -146,17 +139,6 @@ report::Json details_json(const identification::Identification& found) {
                                                          {"speed", run.speed},
                                                          {"inertia", report::measured(run.inertia)}});
   }
-  if (found.speed_calibration)
-    json["sensor_calibration"]["speed"] = {{"scale", report::measured(found.speed_calibration->scale)},
-                                           {"offset", report::measured(found.speed_calibration->offset)}};
-  if (found.position_calibration)
-    json["sensor_calibration"]["position"] = {
-        {"scale", report::measured(found.position_calibration->scale)},
-        {"offset", report::measured(found.position_calibration->offset)},
-        {"play_and_wind_up", report::measured(found.position_calibration->play_and_wind_up)}};
-  for (const identification::CalibrationTrace& trace : found.calibration_traces)
-    json["sensor_calibration"]["traces"].push_back(
-        {{"record", trace.record}, {"motor", trace.motor}, {"difference", trace.difference}});
   if (found.response) json["frequency_response"] = response_json(*found.response);
   if (found.decay) json["decay"] = decay_json(*found.decay);
   if (found.clearance) json["clearance"] = clearance_json(*found.clearance);

@@ -212,9 +212,8 @@ IdentificationCase identification_case(const model::Rig& declared,
 }
 
 Identification identify(const model::Rig& declared, const std::vector<record::Record>& records,
-                        const Progress& progress, const std::optional<rig_file::Drive>& drive) {
+                        const Progress& progress) {
   IdentificationCase c = identification_case(declared, records);
-  c.drive = drive;
   const std::vector<Procedure> procedures = procedures_for(declared);
   double done = 0;
   for (const Procedure& procedure : procedures) {

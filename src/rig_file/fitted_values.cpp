@@ -2,6 +2,7 @@
 // What a fit has found, written into a rig file by the table of parameters.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <string_view>
@@ -31,6 +32,12 @@ bool is_worth_writing(const FittedValues& found, const YamlTree& tree) {
          std::fabs(m.value) > kClear * m.standard_error;
 }
 
+/// A fit may leave the friction of one direction below 0, where its error reaches; no machine has that.
+double possible_asymmetry(const RigParameter& asymmetry, const RigParameter& mean, const model::Rig& rig) {
+  const double most = std::max(0.0, mean.get(rig));
+  return std::clamp(asymmetry.get(rig), -most, most);
+}
+
 /// The map under "gear_train.PART".
 const YamlNode& part_of(const YamlTree& tree, std::string_view part) {
   return *tree.root->entries.at("gear_train").value->entries.at(std::string(part)).value;
@@ -50,7 +57,7 @@ void RigDocument::set_fitted(const FittedValues& found) {
     if (p.kind == ParameterKind::backlash)
       set_backlash(rig, comment);
     else if (const RigParameter* asymmetry = asymmetry_of(p))
-      set_directional(p.key, p.get(rig) / divisor, asymmetry->get(rig) / divisor, comment);
+      set_directional(p.key, p.get(rig) / divisor, possible_asymmetry(*asymmetry, p, rig) / divisor, comment);
     else
       set(p.key, p.get(rig) / divisor, comment);
   }

@@ -103,7 +103,7 @@ int identify_joint(const Arguments& arguments, RecordDoor& door) {
   identification::Identification found = of_file(file.source, [&] {
     ProgressBar bar;  // gone before anything is printed
     return file.diagnosis.waveform ? identification::commission(file, records)
-                                   : identification::identify(file.rig, records, bar.progress(), file.drive);
+                                   : identification::identify(file.rig, records, bar.progress());
   });
   for (const record::Record& record : records)
     for (const std::string& warning : record.warnings) found.warnings.push_back(record.name + ": " + warning);

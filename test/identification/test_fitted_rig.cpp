@@ -73,6 +73,18 @@ TEST(FittedRig, DirectionsAreWrittenApart) {
   EXPECT_EQ(one.rig.motor.coulomb_asymmetry, -2);
 }
 
+// 2 +- 5 N m s/rad, by +-3 more and less in the directions: the file holds 4 and 0.
+TEST(FittedRig, NoDirectionHasFrictionBelowZero) {
+  model::Rig rig = test::other_servo();
+  rig.link.viscous_damping = 2;
+  rig.link.viscous_asymmetry = 3;
+  const rig_file::RigFile servo = test::servo_file();
+  const rig_file::RigFile fitted =
+      rig_file::rig_file_from_text(fitted_rig_text(servo, found_as(rig, {"load_viscous"})), "fitted.yaml");
+  EXPECT_EQ(fitted.rig.link.viscous_damping, 2);
+  EXPECT_EQ(fitted.rig.link.viscous_asymmetry, 2);
+}
+
 TEST(FittedRig, MotorSideFilesGetMotorSideValues) {
   rig_file::RigFile declared = test::servo_file();
   std::string text = declared.text;

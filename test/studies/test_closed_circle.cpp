@@ -92,7 +92,7 @@ TEST_P(ClosedCircle, EveryProcedureFindsWhatWasSimulated) {
     EXPECT_NEAR(f.measured.value, expected, most) << f.procedure << name;
     EXPECT_LT(f.measured.standard_error, most / 2) << f.procedure << name;  // useful: the goal is two of them
   }
-  EXPECT_EQ(procedures.size(), 6u);  // all but the calibration, which has no parameter, and the joint fit
+  EXPECT_EQ(procedures.size(), 6u);  // all but encoder_skew and the joint fit
   for (const auto& [name, m] : c.result.parameters) {
     const double expected = rig_file::servo_parameter(name).get(truth);
     EXPECT_NEAR(m.value, expected, 3.5 * m.standard_error) << name;

@@ -18,7 +18,6 @@
 #include "backlash_diagnosis/identification/procedures/gap_map.h"
 #include "backlash_diagnosis/identification/procedures/line_inertia.h"
 #include "backlash_diagnosis/identification/procedures/one_inertia.h"
-#include "backlash_diagnosis/identification/procedures/sensor_calibration.h"
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
 #include "backlash_diagnosis/identification/several_machines.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
@@ -37,12 +36,6 @@ struct ProcedureReport {
 struct FrictionDetail {
   std::string subject;              // "motor", "drive"
   std::vector<FrictionLine> lines;  // forward, backward, as far as they are there
-};
-
-/// Motor and load position of a run one way, thinned for a plot.
-struct CalibrationTrace {
-  std::string record;
-  std::vector<double> motor, difference;  // rad; motor minus load
 };
 
 struct InertiaDetail {
@@ -82,9 +75,6 @@ struct Identification {
   /// Why the machine is none of the rig file's kind: it explains less than half of what a channel does. The
   /// errors of the values that this channel determines are infinite then.
   std::optional<std::string> unexplained;
-  std::optional<SpeedCalibration> speed_calibration;
-  std::optional<PositionCalibration> position_calibration;
-  std::vector<CalibrationTrace> calibration_traces;
   std::vector<FrictionDetail> friction;
   std::vector<InertiaDetail> inertia;
   std::optional<ResponseDetail> response;
@@ -102,10 +92,8 @@ struct Identification {
 Identification commission(const rig_file::RigFile& file, const std::vector<record::Record>& records);
 
 /// For a rig with two inertias or one (mesh: rigid). Starts from what the rig declares. Throws CannotIdentify
-/// where no procedure can use any record, with all reasons; BadData; Cancelled. `drive` gives the gap map
-/// the orders of its parts.
+/// where no procedure can use any record, with all reasons; BadData; Cancelled.
 Identification identify(const model::Rig& declared, const std::vector<record::Record>& records,
-                        const Progress& progress = nullptr,
-                        const std::optional<rig_file::Drive>& drive = std::nullopt);
+                        const Progress& progress = nullptr);
 
 }  // namespace backlash::identification

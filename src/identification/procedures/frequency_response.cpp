@@ -42,10 +42,9 @@ void require_finite(const std::vector<double>& values, record::Channel channel) 
       throw CannotIdentify(record::channel_name(channel) + " has values that are not finite");
 }
 
-Signals collect(const record::Record& given, ResponseSide side) {
-  const bool motor = side == ResponseSide::motor;
-  const record::Channel velocity = motor ? record::Channel::motor_velocity : record::Channel::load_velocity,
-                        position = motor ? record::Channel::motor_position : record::Channel::load_position;
+Signals collect(const record::Record& given) {
+  const record::Channel velocity = record::Channel::motor_velocity,
+                        position = record::Channel::motor_position;
   if (!given.has(record::Channel::motor_torque)) throw CannotIdentify("the record has no motor_torque");
   if (!given.has(velocity) && !given.has(position))
     throw CannotIdentify("the record has neither " + record::channel_name(velocity) + " nor " +
@@ -75,7 +74,7 @@ struct Sampling {
 Sampling sampling(const Signals& s, const ResponseSettings& settings, double frequency) {
   const double x = M_PI * frequency * s.interval, hold = settings.held ? sinc(x) : 1;
   const Sampling line{hold * (s.from_position ? sinc(2 * x) : 1), 0};
-  if (!settings.held || settings.side == ResponseSide::load) return line;
+  if (!settings.held) return line;
   const double all = s.from_position ? std::pow(std::cos(x), 2) / sinc(x) : 1 / sinc(x);
   return {line.gain, all - line.gain};
 }
@@ -98,8 +97,7 @@ double inertance(const Signals& s, const ResponseSettings& settings, const Frequ
 }
 
 void correct_sampling(const Signals& s, const ResponseSettings& settings, FrequencyResponse& response) {
-  const bool images = settings.held && settings.side == ResponseSide::motor;
-  const double inverse_inertia = images ? inertance(s, settings, response) : 0;
+  const double inverse_inertia = settings.held ? inertance(s, settings, response) : 0;
   for (ResponsePoint& point : response.points) {
     const double w = 2 * M_PI * point.frequency;
     const Sampling line = sampling(s, settings, point.frequency);
@@ -141,19 +139,14 @@ double interpolated(const std::vector<double>& power, std::size_t k) {
   return double(k) + (above ? 1 : -1) * (2 * ratio - 1) / (ratio + 1);
 }
 
-std::size_t segment_length(const Signals& s, double wanted) {
+std::size_t segment_length(const Signals& s) {
   const std::size_t samples = s.torque.size();
   std::size_t segment = kShortestSegment;
-  if (wanted > 0) {
-    segment = 2 * static_cast<std::size_t>(std::lround(0.5 * wanted / s.interval));
-  } else {
-    while (2 * segment <= samples / kFewestSegments && 2.0 * double(segment) * s.interval <= kLongestSegment)
-      segment *= 2;
-  }
-  if (segment < kShortestSegment || 2 * samples / segment < kFewestSegments + 1)
+  while (2 * segment <= samples / kFewestSegments && 2.0 * double(segment) * s.interval <= kLongestSegment)
+    segment *= 2;
+  if (2 * samples / segment < kFewestSegments + 1)
     throw CannotIdentify(std::to_string(samples) + " samples do not hold " + std::to_string(kFewestSegments) +
-                         " half-overlapping segments of " + std::to_string(segment) + " (at least " +
-                         std::to_string(kShortestSegment) + ")");
+                         " half-overlapping segments of " + std::to_string(segment));
   return segment;
 }
 
@@ -164,8 +157,8 @@ bool reverses(const std::vector<double>& speed) {
   return std::sqrt(2 * std::max(0.0, squares / n - mean * mean)) > std::fabs(mean);
 }
 
-FrequencyResponse broadband(const Signals& s, const ResponseSettings& settings) {
-  const std::size_t segment = segment_length(s, settings.segment);
+FrequencyResponse broadband(const Signals& s) {
+  const std::size_t segment = segment_length(s);
   const signal::WelchSpectra spectra = signal::welch(s.torque, s.speed, s.interval, segment);
   const std::vector<double>& power = spectra.xx;
   const double largest = *std::max_element(power.begin() + kFirstLine, power.end());
@@ -196,30 +189,21 @@ FrequencyResponse broadband(const Signals& s, const ResponseSettings& settings) 
 }
 
 void check(const ResponseSettings& settings) {
-  if (!(settings.segment >= 0) || !std::isfinite(settings.segment))
-    throw InvalidParameter("segment", settings.segment, "must be >= 0 s");
   if (!(settings.least_coherence >= 0 && settings.least_coherence <= 1))
     throw InvalidParameter("least_coherence", settings.least_coherence, "must be 0 to 1");
-}
-
-void sort_by_frequency(FrequencyResponse& response) {
-  std::sort(response.points.begin(), response.points.end(),
-            [](const ResponsePoint& a, const ResponsePoint& b) { return a.frequency < b.frequency; });
 }
 
 }  // namespace
 
 FrequencyResponse estimate_response(const record::Record& record, const ResponseSettings& settings) {
   check(settings);
-  const Signals s = collect(record, settings.side);
+  const Signals s = collect(record);
   FrequencyResponse response;
-  const SineRuns sines = settings.method == ResponseMethod::broadband ? SineRuns() : find_sine_runs(s.torque);
-  const bool stepped = settings.method == ResponseMethod::stepped_sine || sines.share >= kSteppedShare;
-  if (stepped && sines.runs.empty()) throw CannotIdentify("the torque holds no four even cycles of one sine");
-  if (stepped)
+  const SineRuns sines = find_sine_runs(s.torque);
+  if (sines.share >= kSteppedShare)
     response.points = stepped_points(s, sines);
   else
-    response = broadband(s, settings);
+    response = broadband(s);
   double best = 0;
   for (const ResponsePoint& point : response.points) best = std::max(best, point.coherence);
   const auto bad = [&](const ResponsePoint& p) {
@@ -231,27 +215,10 @@ FrequencyResponse estimate_response(const record::Record& record, const Response
   if (points.empty())
     throw CannotIdentify("no frequency at which the speed follows the torque: highest coherence " +
                          to_text(best) + ", needed is " + to_text(settings.least_coherence));
-  sort_by_frequency(response);
+  std::sort(points.begin(), points.end(),
+            [](const ResponsePoint& a, const ResponsePoint& b) { return a.frequency < b.frequency; });
   correct_sampling(s, settings, response);
   return response;
-}
-
-FrequencyResponse estimate_response(const std::vector<record::Record>& records,
-                                    const ResponseSettings& settings) {
-  FrequencyResponse all;
-  std::string reasons;
-  for (const record::Record& record : records) {
-    try {
-      const FrequencyResponse one = estimate_response(record, settings);
-      all.points.insert(all.points.end(), one.points.begin(), one.points.end());
-      all.variance_factor = std::max(all.variance_factor, one.variance_factor);
-    } catch (const CannotIdentify& reason) {
-      reasons += (reasons.empty() ? "" : "; ") + record.name + ": " + reason.what();
-    }
-  }
-  if (all.points.empty()) throw CannotIdentify(reasons.empty() ? "no record is given" : reasons);
-  sort_by_frequency(all);
-  return all;
 }
 
 }  // namespace backlash::identification

@@ -174,11 +174,4 @@ FrictionLine fit_friction_line(const std::vector<ConstantSpeedRun>& runs, Direct
   return out;
 }
 
-LoadFriction load_friction(const FrictionLine& drive, const FrictionLine& motor) {
-  const auto difference = [](const signal::Measured& a, const signal::Measured& b) {
-    return signal::Measured{a.value - b.value, std::hypot(a.standard_error, b.standard_error)};
-  };
-  return {difference(drive.coulomb, motor.coulomb), difference(drive.viscous, motor.viscous)};
-}
-
 }  // namespace backlash::identification

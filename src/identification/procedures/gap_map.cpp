@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
@@ -203,10 +202,8 @@ void fit_series(GapMap& map, const GapMapSettings& settings) {
   map.deviation = series.deviation;
   for (const Harmonic& h : series.harmonics)
     if (h.amplitude.value > kRelevant * map.mean_separation.value) map.harmonics.push_back(h);
-  map.varies = !map.harmonics.empty() || !map.waves.waves.empty();
-  double chance = series.chance;
-  for (const GapWave& w : map.waves.waves) chance = std::min(chance, w.chance);
-  map.confidence = 1 - chance;
+  map.varies = !map.harmonics.empty();
+  map.confidence = 1 - series.chance;
 }
 
 double relative(const signal::Measured& m) {
@@ -230,23 +227,11 @@ void correct_wind_up(GapMap& map, const GapMapSettings& s) {
                   std::hypot(map.mean_separation.standard_error, map.wind_up.standard_error)};
 }
 
-std::string words(const GapWave& w) {
-  std::string part;
-  if (w.pinion > 0) {
-    part = w.pinion == 1 ? "with the pinion" : fmt::format("{} times per turn of the pinion", w.pinion);
-    if (w.load != 0) part += " and the gear";
-  }
-  return fmt::format("order {:.6g}{}{}: +-{:.3g} rad", w.order.value,
-                     w.order.standard_error > 0 ? fmt::format(" +- {:.1g}", w.order.standard_error) : "",
-                     part.empty() ? "" : ", " + part, w.amplitude.value);
-}
-
 void say(GapMap& map) {
   const double mean = std::isfinite(map.mean_gap.value) ? map.mean_gap.value : map.mean_separation.value;
   if (map.varies) {
     double lowest = mean, highest = mean;
-    const int turns = map.waves.waves.empty() ? 1 : int(std::ceil(map.waves.turns));
-    for (int i = 0; i < 720 * turns; ++i) {
+    for (int i = 0; i < 720; ++i) {
       const double g = map.gap_at(i * kTurn / 720);
       lowest = std::min(lowest, g);
       highest = std::max(highest, g);
@@ -255,7 +240,6 @@ void say(GapMap& map) {
         "the gap varies with load position between {:.3g} and {:.3g} rad, {:.3g} % of its mean (confidence "
         "{:.3g} %)",
         lowest, highest, 100 * (highest - lowest) / mean, 100 * map.confidence);
-    for (const GapWave& w : map.waves.waves) map.statement += "; " + words(w);
   } else {
     // Amplitude that one harmonic would have to have: 3 standard errors of sqrt(2 / bins) deviations.
     map.statement = fmt::format(
@@ -263,22 +247,6 @@ void say(GapMap& map) {
         std::max(3 * map.deviation * std::sqrt(2.0 / double(map.bins.size())),
                  kRelevant * map.mean_separation.value));
   }
-}
-
-/// The part of the gap that does not turn with the load, from the runs.
-void take_waves_out(GapMap& map, Run& forward, Run& reverse, const GapMapSettings& settings) {
-  GapWaveSettings of_waves;
-  of_waves.drive = settings.drive ? &*settings.drive : nullptr;
-  const auto mean = [](const Values& x) {
-    return std::accumulate(x.begin(), x.end(), 0.0) / double(x.size());
-  };
-  of_waves.least_amplitude = kRelevant * std::fabs(mean(forward.difference) - mean(reverse.difference));
-  map.waves =
-      find_gap_waves({forward.load, forward.difference}, {reverse.load, reverse.difference}, of_waves);
-  map.warnings = map.waves.warnings;
-  for (Run* run : {&forward, &reverse})
-    for (std::size_t i = 0; i < run->load.size(); ++i)
-      run->difference[i] -= std::copysign(0.5, run->speed) * map.waves.at(run->load[i]);
 }
 
 void check(const GapMapSettings& s) {
@@ -297,7 +265,7 @@ void check(const GapMapSettings& s) {
 double GapMap::gap_at(double position) const {
   double gap = std::isfinite(mean_gap.value) ? mean_gap.value : mean_separation.value;
   for (const Harmonic& h : harmonics) gap += h.amplitude.value * std::sin(h.order * position + h.phase.value);
-  return gap + waves.at(position);
+  return gap;
 }
 
 GapMap identify_gap_map(const record::Record& one_way, const record::Record& other_way,
@@ -311,7 +279,6 @@ GapMap identify_gap_map(const record::Record& one_way, const record::Record& oth
                     forward.speed, reverse.speed));
   const double width = kTurn / settings.bins;
   GapMap map;
-  take_waves_out(map, forward, reverse, settings);
   measure_scale(forward, width);
   measure_scale(reverse, width);
   map.forward_speed = forward.speed;

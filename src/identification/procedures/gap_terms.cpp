@@ -45,8 +45,6 @@ GapMap with_mean_gap(GapMap map, const signal::Measured& fitted) {
   map.mean_gap = fitted;
   for (const Harmonic& h : map.harmonics)
     map.mean_gap.standard_error = std::hypot(map.mean_gap.standard_error, h.amplitude.standard_error);
-  for (const GapWave& w : map.waves.waves)
-    map.mean_gap.standard_error = std::hypot(map.mean_gap.standard_error, w.amplitude.standard_error);
   map.wind_up = {map.mean_separation.value - map.mean_gap.value,
                  std::hypot(map.mean_separation.standard_error, map.mean_gap.standard_error)};
   return map;
@@ -62,10 +60,6 @@ model::Rig with_gap_map(model::Rig rig, const GapMap& map, GapUse use) {
     rig.terms.push_back(model::make_term(
         order_term(),
         {{"amplitude", h.amplitude.value / mean}, {"order", double(h.order)}, {"phase", h.phase.value}}));
-  for (const GapWave& w : map.waves.waves)
-    rig.terms.push_back(model::make_term(
-        order_term(),
-        {{"amplitude", w.amplitude.value / mean}, {"order", w.order.value}, {"phase", w.phase.value}}));
   return rig;
 }
 
@@ -78,13 +72,6 @@ void replace_gap_terms(rig_file::RigDocument& document, const GapMap& map, doubl
                     "    phase: {:<17.4f} # rad, +- {:.1g}\n",
                     order_term(), h.amplitude.value / mean, h.amplitude.standard_error / mean, h.order,
                     h.phase.value, h.phase.standard_error));
-  for (const GapWave& w : map.waves.waves)
-    entries.push_back(fmt::format(
-        "  - id: {}\n    amplitude: {:<13.5f} # -, +- {:.1g}\n    order: {:<17.7g} # 1/rad{}\n"
-        "    phase: {:<17.4f} # rad, +- {:.1g}\n",
-        order_term(), w.amplitude.value / mean, w.amplitude.standard_error / mean, w.order.value,
-        w.order.standard_error > 0 ? fmt::format(", +- {:.1g}", w.order.standard_error) : ", of the drive",
-        w.phase.value, w.phase.standard_error));
   document.replace_terms(varies_gap, entries);
 }
 

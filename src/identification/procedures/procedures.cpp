@@ -57,7 +57,6 @@ std::vector<std::string> on_each(const IdentificationCase& c, bool (CaseRecord::
 
 const std::vector<Procedure>& servo_procedures() {
   static const std::vector<Procedure> procedures = {{"encoder_skew", run_encoder_skew},
-                                                    {"sensor_calibration", run_sensor_calibration},
                                                     {"friction_lines", run_friction_lines},
                                                     {"line_inertia", run_line_inertia},
                                                     {"frequency_response", run_frequency_response},

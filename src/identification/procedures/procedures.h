@@ -29,8 +29,7 @@ struct IdentificationCase {
   std::vector<std::string> names;  // of the parameters to be found
   signal::Measured skew{0, 0};     // s, of the load encoder, that has been taken out of the records
   model::Rig declared;
-  std::optional<rig_file::Drive> drive;  // of the rig file, where it states one
-  Identification result;                 // result.rig: what is known by now
+  Identification result;  // result.rig: what is known by now
 };
 
 IdentificationCase identification_case(const model::Rig& declared,
@@ -50,7 +49,6 @@ void update_from_findings(IdentificationCase& c);
 
 /// The steps, one file each in this folder.
 ProcedureReport run_encoder_skew(IdentificationCase& c);
-ProcedureReport run_sensor_calibration(IdentificationCase& c);
 ProcedureReport run_friction_lines(IdentificationCase& c);
 ProcedureReport run_line_inertia(IdentificationCase& c);
 ProcedureReport run_frequency_response(IdentificationCase& c);

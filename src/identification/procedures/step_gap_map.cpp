@@ -44,7 +44,6 @@ ProcedureReport run_gap_map(IdentificationCase& c) {
     for (const OneWay& b : runs) {
       if (!(a.speed > 0 && b.speed < 0)) continue;
       GapMapSettings settings;
-      settings.drive = c.drive;
       settings.stiffness = known(c, "mesh_stiffness");
       settings.friction_forward = load_friction_at(c, a.speed);
       settings.friction_reverse = load_friction_at(c, b.speed);
@@ -63,7 +62,6 @@ ProcedureReport run_gap_map(IdentificationCase& c) {
   const GapMap& map = *c.result.gap_map;
   add_finding(c, report.name, {{"backlash_angle", 1}}, map.mean_gap);
   report.message = "mean gap " + plus_minus(map.mean_gap, "rad") + "; " + map.statement;
-  for (const std::string& warning : map.waves.warnings) c.result.warnings.push_back("gap map: " + warning);
   if (map.varies) {  // the clearance is then that of one place
     auto& all = c.result.findings;
     all.erase(

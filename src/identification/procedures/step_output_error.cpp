@@ -148,6 +148,7 @@ std::optional<OutputError> with_hertzian_fit(const OutputError& fit, const std::
     if (most_left(other) < most_left(fit)) return other;
   } catch (const CannotIdentify&) {
   } catch (const InvalidParameter&) {  // values that no machine has
+  } catch (const IntegrationError&) {  // or with which the load runs away
   }
   return std::nullopt;
 }

@@ -22,18 +22,18 @@ constexpr double kStartDamping = 0.1;  // choice: damping ratio
 struct Point {
   double frequency = 0, error = 0;
   std::complex<double> response;
-  bool load = false;
 };
 
-void add(std::vector<Point>& all, const FrequencyResponse& response, bool load) {
-  const auto& points = response.points;
+std::vector<Point> pooled(const std::vector<ResponsePoint>& points) {
+  std::vector<Point> all;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::size_t first = i < kPool ? 0 : i - kPool, last = std::min(points.size() - 1, i + kPool);
     double sum = 0;
     for (std::size_t k = first; k <= last; ++k) sum += std::pow(points[k].standard_error, 2);
     const double error = std::sqrt(sum / double(last - first + 1));
-    all.push_back({points[i].frequency, std::max(kLeastError, error), points[i].response, load});
+    all.push_back({points[i].frequency, std::max(kLeastError, error), points[i].response});
   }
+  return all;
 }
 
 // Parameters: logarithms of motor inertia, load inertia, stiffness; damping, motor and load viscous, delay.
@@ -46,9 +46,8 @@ Eigen::VectorXd residuals(const std::vector<Point>& points, const Eigen::VectorX
   Eigen::VectorXd r(2 * points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point& point = points[i];
-    const auto expected = point.load ? m.load_response(point.frequency) : m.motor_response(point.frequency);
-    const auto difference =
-        std::log(point.response / expected * std::polar(1.0, 2 * M_PI * point.frequency * p[6]));
+    const auto difference = std::log(point.response / m.motor_response(point.frequency) *
+                                     std::polar(1.0, 2 * M_PI * point.frequency * p[6]));
     r[2 * static_cast<Eigen::Index>(i)] = difference.real() / point.error;
     r[2 * static_cast<Eigen::Index>(i) + 1] = difference.imag() / point.error;
   }
@@ -89,7 +88,7 @@ TwoMass TwoMassFit::model() const {
           damping.value,       motor_viscous.value, load_viscous.value};
 }
 
-TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse& load) {
+TwoMassFit fit_two_mass(const FrequencyResponse& motor) {
   const Resonances seen = find_resonances(motor);
   const InertiaPlateaus inertias = find_inertias(motor, seen);
   const StiffnessSplit start = split_stiffness(KnownInertia::total_inertia, seen, inertias.total, {});
@@ -101,9 +100,7 @@ TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse&
       kStartDamping * critical, 0, 0, 0;
   scale << 1, 1, 1, kStartDamping * critical, viscous, viscous, 0.1 / motor.points.back().frequency;
 
-  std::vector<Point> points;
-  add(points, motor, false);
-  add(points, load, true);
+  std::vector<Point> points = pooled(motor.points);
   const auto fitted = [&](const Eigen::VectorXd& from) {
     return fit::fit_nonlinear([&](const Eigen::VectorXd& q) { return residuals(points, q); }, from, scale);
   };
@@ -114,7 +111,7 @@ TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse&
     throw CannotIdentify("two inertias with a spring between them do not fit the response");
 
   const double least = 1 / std::min(1.0, fit.deviation);
-  const double factor = std::max(motor.variance_factor, load.variance_factor) * least * least;
+  const double factor = motor.variance_factor * least * least;
   const auto of = [&](const std::function<double(const Eigen::VectorXd&)>& value) {
     signal::Measured m = derived(fit, scale, factor, value);
     m.standard_error = std::hypot(m.standard_error, kLeastError * m.value);

@@ -94,30 +94,6 @@ TEST(FrictionLine, AStraightLineRarelyWarns) {
   EXPECT_GT(warned, 5);  // and not for lack of attention
 }
 
-TEST(FrictionLine, LoadIsDriveMinusMotor) {
-  // Printed lines of both (Figures 5.2 and 5.3, Section 5.2.1) as rows; straight lines come back exactly.
-  std::vector<ConstantSpeedRun> motor, drive;
-  for (const double w : {0.2, 0.8, 1.6}) {
-    motor.push_back(row(w, 63.0 + 13.7 * w, 0.3));
-    motor.push_back(row(-w, -62.7 - 11.5 * w, 0.3));
-    drive.push_back(row(w, 79.4 + 18.0 * w, 0.4));
-    drive.push_back(row(-w, -77.9 - 21.6 * w, 0.4));
-  }
-  const auto load = [&](Direction d) {
-    return load_friction(fit_friction_line(drive, d), fit_friction_line(motor, d));
-  };
-  EXPECT_NEAR(load(Direction::positive).coulomb.value, 16.4, 1e-9);
-  EXPECT_NEAR(load(Direction::positive).viscous.value, 4.3, 1e-9);
-  EXPECT_NEAR(load(Direction::negative).coulomb.value, -15.2, 1e-9);
-  EXPECT_NEAR(load(Direction::negative).viscous.value, 10.1, 1e-9);
-  // By hand: slope error s / sqrt(sum (w - mean)^2) with errors 0.3 and 0.4 -> 0.5 of the difference.
-  const double mean = 2.6 / 3,
-               sum = std::pow(0.2 - mean, 2) + std::pow(0.8 - mean, 2) + std::pow(1.6 - mean, 2);
-  EXPECT_NEAR(load(Direction::positive).viscous.standard_error, 0.5 / std::sqrt(sum), 1e-9);
-  EXPECT_NEAR(load(Direction::positive).coulomb.standard_error, 0.5 * std::sqrt(1.0 / 3 + mean * mean / sum),
-              1e-9);
-}
-
 TEST(FrictionLine, StatedErrorsOfTheRowsAreWeights) {
   // Two rows on a line, the third off by 10 but with a hundred times the error: moves the line by 1e-3 only.
   const std::vector<ConstantSpeedRun> rows = {row(1, 2, 0.1), row(2, 3, 0.1), row(3, 14, 10)};

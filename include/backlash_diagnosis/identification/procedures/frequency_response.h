@@ -51,25 +51,15 @@ struct FrequencyResponse {
   double variance_factor = 1;
 };
 
-enum class ResponseSide { motor, load };
-enum class ResponseMethod { automatic, stepped_sine, broadband };
-
 struct ResponseSettings {
-  ResponseSide side = ResponseSide::motor;  // whose speed; velocity if recorded, else from position
-  ResponseMethod method = ResponseMethod::automatic;
   bool held = false;             // motor_torque[k] acts from sample k to k + 1; false: instantaneous value
-  double segment = 0;            // s, of the broadband estimator; 0: an eighth of the record, at most 16 s
   double least_coherence = 0.5;  // points below are dropped
 };
 
-/// Points with coherence >= least_coherence below a quarter of the sampling rate. Throws CannotIdentify where
-/// a column is missing or not finite, the torque does not vary, the record is too short, or no point is left;
-/// BadData for gaps in time; InvalidParameter for a negative segment or a least_coherence outside 0 to 1.
+/// Of the motor's speed: velocity if recorded, else from position. Points with coherence >= least_coherence
+/// below a quarter of the sampling rate. Throws CannotIdentify where a column is missing or not finite, the
+/// torque does not vary, the record is too short, or no point is left; BadData for gaps in time;
+/// InvalidParameter for a least_coherence outside 0 to 1.
 FrequencyResponse estimate_response(const record::Record& record, const ResponseSettings& settings = {});
-
-/// The same from several runs: points of all, sorted. Records that cannot be used are left out; throws
-/// CannotIdentify with all the reasons where none can.
-FrequencyResponse estimate_response(const std::vector<record::Record>& records,
-                                    const ResponseSettings& settings = {});
 
 }  // namespace backlash::identification

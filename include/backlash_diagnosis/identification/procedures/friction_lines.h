@@ -38,10 +38,4 @@ struct FrictionLine {
 /// distinct speeds in the direction, and with only two rows without standard errors.
 FrictionLine fit_friction_line(const std::vector<ConstantSpeedRun>& runs, Direction direction);
 
-/// Coulomb and viscous part of the load: whole drive minus motor alone, independent errors.
-struct LoadFriction {
-  signal::Measured coulomb, viscous;
-};
-LoadFriction load_friction(const FrictionLine& drive, const FrictionLine& motor);
-
 }  // namespace backlash::identification

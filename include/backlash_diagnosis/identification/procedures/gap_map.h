@@ -12,17 +12,16 @@
 // in configuration 1 of the thesis (friction system minus driver), which is what its unexplained ratio of
 // Section 6.3 looks like. The series is g(q) = mean + sum A_n sin(n q + phi_n). Orders are taken one after
 // the other while an F-test (2 parameters, Bonferroni over the orders that are left) finds them at
-// `false_alarm`. Waves that turn with another part than the load, such as the pinion, are estimated first and
-// subtracted from both runs (gap_waves.h): their orders are no whole numbers, and over a turn they average
-// out.
+// `false_alarm`.
+//
+// What turns with another part than the load, as the pinion, is no series over a turn of it: trace_residual
+// finds its order.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/procedures/gap_waves.h"
 #include "backlash_diagnosis/identification/procedures/harmonics.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
@@ -32,11 +31,10 @@ namespace backlash::identification {
 struct GapMapSettings {
   signal::Measured stiffness;  // N m/rad; NaN: no correction of the wind-up
   signal::Measured friction_forward,
-      friction_reverse;                  // N m, of the load, both > 0, at the speed of the runs
-  int bins = 180;                        // per turn, 8 to 3600
-  int highest_order = 20;                // 0 to bins / 4
-  double false_alarm = 0.01;             // of "the gap varies", 1e-6 to 0.5
-  std::optional<rig_file::Drive> drive;  // whose last stage gives the orders of the pinion
+      friction_reverse;       // N m, of the load, both > 0, at the speed of the runs
+  int bins = 180;             // per turn, 8 to 3600
+  int highest_order = 20;     // 0 to bins / 4
+  double false_alarm = 0.01;  // of "the gap varies", 1e-6 to 0.5
 };
 
 /// Values at the middle of the bin; standard errors from the scatter inside, its correlation in time
@@ -57,15 +55,13 @@ struct GapMap {
   signal::Measured scale_forward, scale_reverse, scale;  // motor travel per load travel of the runs, and mean
   double forward_speed = 0, reverse_speed = 0;           // rad/s, of the load, medians
   std::vector<Harmonic> harmonics;                       // by order, those above a thousandth of the mean
-  GapWaves waves;        // what turns with other parts; the bins and harmonics are without it
-  double deviation = 0;  // rad, of the bins from the series
+  double deviation = 0;                                  // rad, of the bins from the series
   bool varies = false;
   double confidence = 0;  // that it varies: 1 - chance of the strongest harmonic
   std::string statement;  // the same in words
   std::vector<std::string> warnings;
 
-  /// Series with the corrected mean where known, else the separation's [rad]. The position is that of the
-  /// load with its turns: they say where the pinion is.
+  /// Series with the corrected mean where known, else the separation's [rad].
   double gap_at(double position) const;
 };
 

@@ -29,12 +29,12 @@ GapMap with_mean_gap(GapMap map, const signal::Measured& fitted);
 /// Whether a term says how the backlash depends on the position of the load: varying_backlash, backlash_map.
 bool gap_varies(const model::Rig& rig);
 
-/// The rig (load side) with the orders and waves of the map as terms varying_backlash instead of any that
+/// The rig (load side) with the orders of the map as terms varying_backlash instead of any that
 /// gap_varies() asks for, and the mean gap as `use` says; the other terms stay. Throws InvalidParameter where
 /// the mean is not > 0.
 model::Rig with_gap_map(model::Rig rig, const GapMap& map, GapUse use = GapUse::corrected);
 
-/// Puts one term varying_backlash per order and wave of the map into a rig file, in place of those that
+/// Puts one term varying_backlash per order of the map into a rig file, in place of those that
 /// gap_varies() asks for. `mean_gap` [rad] is the backlash_angle of the document. Throws InvalidParameter
 /// where it is not > 0, BadData where there are no such terms in block style.
 void replace_gap_terms(rig_file::RigDocument& document, const GapMap& map, double mean_gap);

@@ -100,13 +100,13 @@ struct TwoMassFit {
 };
 
 /// Least squares of ln(H / model) + j w delay, weighted with the standard errors (pooled over five
-/// neighbours, at least 0.001), points of motor and load response together; points that miss by more than
+/// neighbours, at least 0.001); points that miss by more than
 /// five deviations are dropped once, a tenth of all at most. Standard errors from the residuals'
 /// own scatter, at least what the points' errors give, and 0.1 % of the value, which sampling and transients
 /// leave however many points there are.
 /// Viscous friction is what is in phase with the speed: where the speed reverses it holds Coulomb friction
-/// and depends on the amplitude; of motor and load viscous the sum is known best. `load` may be empty. Throws
+/// and depends on the amplitude; of motor and load viscous the sum is known best. Throws
 /// CannotIdentify where find_resonances or find_inertias do, or where the fit ends nowhere.
-TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse& load = {});
+TwoMassFit fit_two_mass(const FrequencyResponse& motor);
 
 }  // namespace backlash::identification
