@@ -52,6 +52,8 @@ class ChangeSearch {
   std::optional<LoudStretch> louder(const std::vector<FoundChange>& all) const;
   Change unknown(const LoudStretch& stretch) const;
   const std::vector<std::string>& different() const { return different_; }
+  /// So many columns of a background are of the machine itself and what it may wander by.
+  Eigen::Index own() const { return beside_column_; }
   /// Values of the columns that stand beside, `found` being so.
   std::vector<signal::Measured> beside(const std::vector<FoundChange>& found) const;
 

@@ -62,7 +62,8 @@ ChannelChanges changes_in(const HealthyModel& model, const record::Record& recor
   for (const std::string& name : search.different())
     out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
                            ": it did not change within the record");
-  for (const DifferentValue& value : different_values(model, search.background(found), linear)) {
+  for (const DifferentValue& value :
+       different_values(model, search.background(found), search.own(), linear)) {
     if (std::find(out.different.begin(), out.different.end(), value.name) != out.different.end()) continue;
     out.different.push_back(value.name);
     out.cannot_tell += (out.cannot_tell.empty() ? "" : "; ") +
