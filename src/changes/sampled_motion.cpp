@@ -92,10 +92,8 @@ bool rests_on_flank(const SampledMotion& motion, std::size_t k) {
   if (!motion.sampling.mesh || k == 0) return true;
   const Moment &now = motion.moments[k], &before = motion.moments[k - 1];
   if (now.side() != before.side()) return false;
-  if (motion.sampling.channel == ChangeChannel::torque) return true;
-  const double least = motion.sampling.mesh->least;
-  const double other = now.mesh + (motion.sampling.other_load ? motion.sampling.other_load(now) : 0);
-  return std::min(std::fabs(now.mesh), now.side() * other) > least;
+  return motion.sampling.channel == ChangeChannel::torque ||
+         std::fabs(now.mesh) > motion.sampling.mesh->least;
 }
 
 /// Samples that are present, move and rest on a flank, as do those within `guard` about them.
