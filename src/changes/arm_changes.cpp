@@ -120,9 +120,7 @@ bool ArmChanges::is_of_chain(const ArmJoint& joint, std::size_t place, const Fou
   return std::any_of(chain_.begin(), chain_.end(), [&](const FoundChainChange& f) {
     const bool together = change.since_from - settings_.same_event <= start + f.high &&
                           start + f.low - settings_.same_event <= change.since_to;
-    const bool within = next.from >= f.from && next.from < f.to;
-    const double least = together ? settings_.least_beside : within ? settings_.least_further : 0;
-    return next.score.gain < least * f.shares[place];
+    return together && next.score.gain < settings_.least_beside * f.shares[place];
   });
 }
 

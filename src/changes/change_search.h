@@ -69,7 +69,6 @@ class ChangeSearch {
   Eigen::VectorXd left_with(const FoundChange& f, const Background& b) const;
   Eigen::VectorXd values_without_wander(const FoundChange& f, const Background& b) const;
   bool needs_wander(const FoundChange& f, const Background& b) const;
-  bool is_drift(const FoundChange& f) const;
   bool believed(const FoundChange& f, const Background& b) const;
   bool begins_before(const FoundChange& f, const Background& b) const;
   void differ(FoundChange f);
