@@ -35,7 +35,6 @@ ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motio
   const Background with = background(beside_);
   first_.nuisances = with.columns;
   first_.spread = with.spread;
-  beside_columns_ = first_.nuisances.cols() - beside_column_;
   prepare_columns(motion_, candidates_);
 }
 

@@ -81,7 +81,6 @@ struct ChangeSettings {
   int most_changes = 4;         // Choice
   double onset_drop = 8;        // of twice the log likelihood, as wide as the onset is uncertain. Simulation
   double onset_least = 0.1;     // s, half of the narrowest interval. Choice
-  double unknown_left = 0.4;  // - of the squares after the onset that may be left. Choice
   // Squares of the residual over those of healthy motion as rough, of what no effect explains: beyond it the
   // answer is "cannot tell", or a change. Choices. Simulation of healthy machines in other tasks: one inertia
   // 2, two 5.
