@@ -202,11 +202,6 @@ std::optional<FoundChainChange> ChainSearch::best(const std::vector<FoundChainCh
   find_end(*found, sums);
   if (!plausible(*found)) return std::nullopt;
   set_onset(*found, sums);
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const EffectSums::Normal n = sums.joints[j].normal(found->from, found->to, backgrounds_[j]);
-    const Eigen::VectorXd& x = found->score.values;
-    found->shares.push_back(std::max(0.0, 2 * n.moment.dot(x) - x.dot(n.information * x)));
-  }
   return found;
 }
 

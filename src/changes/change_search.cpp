@@ -342,13 +342,6 @@ Change ChangeSearch::change_of(const FoundChange& f, const std::vector<FoundChan
   change.gain = f.gain;
   onset_interval(f, sums_of(f, b), b, change);
   onset_with_left(f, b, change);
-  // Intervals of changes of one event contain each other's onset.
-  for (const FoundChange& o : others)
-    if (std::fabs(double(o.from) - double(f.from)) * settings_.block < settings_.same_event) {
-      change.since_from -= settings_.same_event / 2;
-      change.since_to += settings_.same_event / 2;
-      break;
-    }
   if (f.to < blocks_) change.until = motion_.start + settings_.block * double(f.to);
   double rows = 0;
   change.error_before = std::sqrt(left_after(b, f.from, f.to, rows) / std::max(rows, 1.0));

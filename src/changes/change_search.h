@@ -31,6 +31,7 @@ class ChangeSearch {
                const HealthyScores& scores, const std::vector<FoundChange>& beside,
                const ChangeSettings& settings, const Progress& progress);
 
+  const HealthyModel& model() const { return model_; }
   std::vector<FoundChange> run();
   /// The best change beside those that were found, if it is believed. What the record has from its beginning
   /// is no change from then on.

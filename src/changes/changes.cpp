@@ -28,18 +28,8 @@ ChannelChanges changes_in(const HealthyModel& model, const record::Record& recor
   ChannelChanges result;
   const std::vector<FoundChange>& found = result.found = search.run();
   result.beside = search.beside(found);
-  Changes& out = result.reported;
-  out.windows = search.windows();
-  out.threshold = search.threshold(1);
-  out.noise = model.noise;
-  for (const ChangeEffect& e : model.further) out.healthy_terms.push_back(e.name());
-  for (const FoundChange& f : found) out.changes.push_back(search.change_of(f, found, linear));
-  report_unexplained(search, found, model.sampling.mesh.has_value(), settings, out);
-  take_out_short(settings, out);
-  out.different = search.different();
-  for (const std::string& name : search.different())
-    out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                           ": it did not change within the record");
+  Changes& out = result.reported =
+      reported_changes(search, found, model.sampling.mesh.has_value(), linear, settings);
   for (const DifferentValue& value :
        different_values(model, search.background(found), search.own(), linear)) {
     if (std::find(out.different.begin(), out.different.end(), value.name) != out.different.end()) continue;

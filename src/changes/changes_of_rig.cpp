@@ -223,12 +223,7 @@ class RigChanges {
     out.noise = rig_.residual[0];
     for (std::size_t i = 0; i < found.changes.size(); ++i)
       out.changes.push_back(change_of(s, found.changes[i], found.beside(i)));
-    for (const RigChange& d : found.different) {
-      const std::string& name = rig_.effects[d.effect].name;
-      out.different.push_back(name);
-      out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                             ": it did not change within the record");
-    }
+    for (const RigChange& d : found.different) add_different(rig_.effects[d.effect].name, out);
     if (const auto unexplained = s.unexplained(found)) {
       const std::string text =
           fmt::format("since {:.0f} s the values of the machine together are others, though none alone is",

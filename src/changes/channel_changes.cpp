@@ -7,12 +7,12 @@
 #include "backlash_diagnosis/base/text.h"
 
 namespace backlash::changes {
+namespace {
 
+/// "37 s"
 std::string whole_seconds(double time) {
   return to_text(std::round(time)) + " s";
 }
-
-namespace {
 
 double rounded(double x) {
   return std::round(10 * x) / 10;
@@ -50,8 +50,6 @@ void report_louder(const ChangeSearch& search, Changes& out) {
       "follows no effect";
 }
 
-}  // namespace
-
 void report_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
                         const ChangeSettings& settings, Changes& out) {
   const std::optional<LoudStretch> loud = search.loud(found);
@@ -74,6 +72,28 @@ void report_unexplained(const ChangeSearch& search, const std::vector<FoundChang
   } else if (found.empty()) {
     report_louder(search, out);
   }
+}
+
+}  // namespace
+
+Changes reported_changes(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
+                         bool linear, const ChangeSettings& settings) {
+  Changes out;
+  out.windows = search.windows();
+  out.threshold = search.threshold(1);
+  out.noise = search.model().noise;
+  for (const ChangeEffect& e : search.model().further) out.healthy_terms.push_back(e.name());
+  for (const FoundChange& f : found) out.changes.push_back(search.change_of(f, found, linear));
+  report_unexplained(search, found, of_two, settings, out);
+  take_out_short(settings, out);
+  for (const std::string& name : search.different()) add_different(name, out);
+  return out;
+}
+
+void add_different(const std::string& name, Changes& out) {
+  out.different.push_back(name);
+  out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
+                         ": it did not change within the record");
 }
 
 void take_out_short(const ChangeSettings& settings, Changes& out) {
