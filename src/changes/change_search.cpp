@@ -204,6 +204,21 @@ bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
          (one ? settings_.learned_from_one : 1) * threshold(f.score.values.size());
 }
 
+EffectSums::Score ChangeSearch::score_of(const Eigen::MatrixXd& columns, const FoundChange& f,
+                                         const Background& b) const {
+  return EffectSums(motion_, columns, b, settings_.block, false).score(f.from, f.to, b);
+}
+
+/// Another effect, or one of another shape, instead where that explains so many times as much.
+bool ChangeSearch::take_better(FoundChange& f, const ChangeEffect& e, double times,
+                               const Background& b) const {
+  EffectSums::Score s = score_of(*effect_columns(motion_, e), f, b);
+  if (s.gain <= times * f.score.gain) return false;
+  f.effect = e;
+  f.score = std::move(s);
+  return true;
+}
+
 void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
   if (!f.effect.has_order()) return;
   const double least = f.effect.least_order();
@@ -212,12 +227,7 @@ void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
     for (int i = -5; i <= 5; ++i) {
       ChangeEffect e = f.effect;
       e.shape = middle + step * i;
-      if (e.shape < least) continue;
-      const EffectSums sums(motion_, *effect_columns(motion_, e), b, settings_.block, false);
-      EffectSums::Score s = sums.score(f.from, f.to, b);
-      if (s.gain <= f.score.gain) continue;
-      f.effect = e;
-      f.score = std::move(s);
+      if (e.shape >= least) take_better(f, e, 1, b);
     }
   }
 }
@@ -239,8 +249,7 @@ void ChangeSearch::refine(FoundChange& f, const Background& b) const {
 void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
   const std::optional<ChangeEffect> e = with_inertia(f.effect);
   if (!e) return;
-  EffectSums::Score s =
-      EffectSums(motion_, *effect_columns(motion_, *e), b, settings_.block, false).score(f.from, f.to, b);
+  EffectSums::Score s = score_of(*effect_columns(motion_, *e), f, b);
   if (s.values.size() == 0 || s.gain < f.score.gain + settings_.onset_drop * f.inflation) return;
   f.effect = *e;
   f.score = std::move(s);

@@ -73,6 +73,8 @@ class ChangeSearch {
   bool begins_before(const FoundChange& f, const Background& b) const;
   void differ(FoundChange f);
   bool further(const FoundChange& next, const std::vector<FoundChange>& found) const;
+  EffectSums::Score score_of(const Eigen::MatrixXd& columns, const FoundChange& f, const Background& b) const;
+  bool take_better(FoundChange& f, const ChangeEffect& e, double times, const Background& b) const;
   void refine(FoundChange& f, const Background& b) const;
   void refine_order(FoundChange& f, const Background& b) const;
   void refine_slip(FoundChange& f, const Background& b) const;
