@@ -34,7 +34,7 @@ std::vector<double> ChangeSearch::squares_over_healthy(const std::vector<FoundCh
     b.estimate = weighted.estimate;
   }
   const Eigen::VectorXd left = b.left();
-  const Eigen::VectorXd squares = left.array().square() / expected_squares(model_, motion_).array();
+  const Eigen::VectorXd squares = left.array().square() / b.variance;
   return {squares.begin(), squares.end()};
 }
 
@@ -55,7 +55,7 @@ std::optional<LoudStretch> ChangeSearch::louder() const {
   for (Eigen::Index r = 0; r < motion_.size(); ++r) {
     const Moment& m = motion_.moment(r);
     motion.row(r) << m.position, m.position * m.position, std::fabs(m.speed), std::fabs(m.acceleration),
-        std::sqrt(m.roughness);
+        std::fabs(m.jerk);
   }
   return louder_stretch(times(), squares_over_healthy({}), motion, settings_);
 }

@@ -46,7 +46,6 @@ struct Moment {
   double speed;         // rad/s
   double acceleration;  // rad/s^2, the mean of both inertias by their weight
   double jerk;          // rad/s^3
-  double roughness;     // rad^2/s^6, mean square of that about the moment
   double direction;     // -1..1
   double way;           // rad, since the last reversal
   double load;          // N m, that the healthy machine's load takes

@@ -43,11 +43,8 @@ struct ChangeSettings {
   double drift = 0.1;         // - of dry friction over a record, by temperature. Choice
   // Dry and viscous friction wander from minute to minute. Bittencourt and Axelsson (LiTH-ISY-R-3058) measure
   // more by temperature alone. Choices.
-  double wander = 0.03;      // -, of each, standard deviation
-  double wander_time = 100;  // s, over which
-  double rough = 0.15;  // s to either side, over which the motion's roughness is taken. Simulation: teeth
-                        // that cross the gap ring for as long, and so do ends of moves
-  double least_steady = 0.1;  // - of the squares of the residual, that no roughness explains. Choice
+  double wander = 0.03;       // -, of each, standard deviation
+  double wander_time = 100;   // s, over which
   double chain_share = 0.02;  // - of what the rest of an arm takes, that a joint may show otherwise. Choice:
                               // torque constants fall by as much as windings warm up by 10 K (magnets 0.1 to
                               // 0.2 %/K)
@@ -81,7 +78,7 @@ struct ChangeSettings {
   int most_changes = 4;         // Choice
   double onset_drop = 8;        // of twice the log likelihood, as wide as the onset is uncertain. Simulation
   double onset_least = 0.1;     // s, half of the narrowest interval. Choice
-  // Squares of the residual over those of healthy motion as rough, of what no effect explains: beyond it the
+  // Squares of the residual over those of the healthy machine, of what no effect explains: beyond it the
   // answer is "cannot tell", or a change. Choices. Simulation of healthy machines in other tasks: one inertia
   // 2, two 5.
   double unknown_louder = 4, unknown_of_two = 16;
