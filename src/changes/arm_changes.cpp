@@ -36,16 +36,12 @@ class ArmChanges {
   void search(const arm::ArmRecord& record);
   void take(const FoundChainChange& found, const arm::ArmRecord& record);
   ChainDifference difference_of(const FoundChainChange& found, bool from_beginning, double end) const;
-  void name_alike(FoundChainChange& of_chain, const ArmJoint& joint, FoundChange& own) const;
-  bool is_of_chain(const ArmJoint& joint, std::size_t place, const FoundChange& next) const;
   // What is reported
   void report_pushes(const arm::ArmRecord& record);
-  void report_joint(const ArmJoint& joint, std::size_t place);
+  void report_joint(const ArmJoint& joint);
   void report_deflection(std::size_t index);
-  void add(const std::string& joint, const Changes& one, const ChangeSearch& search,
-           const HealthyModel& model);
+  void add(const std::string& joint, const Changes& one);
   void add_constant_error(const ArmJoint& joint, Change& change) const;
-  bool is_left_by_chain(const ArmJoint& joint, std::size_t place, const Change& change) const;
   double left(const FoundChainChange& f) const;
   Change change_of(const FoundChainChange& f) const;
   void add_scale();
@@ -82,10 +78,8 @@ void ArmChanges::take(const FoundChainChange& found, const arm::ArmRecord& recor
   const bool from_beginning = found.low <= 0;
   const double before = left(found);
   arm_->differ(difference_of(found, from_beginning, record.joints.front().time.back()), record);
-  std::size_t j = 0;
   for (ArmJoint& joint : joints()) {
     FoundChange beside{found.effect.at_joint(), found.from, found.to, {}, found.inflation, 0, {}};
-    beside.gain = found.shares[j++];
     if (from_beginning) beside.from = 0;
     if (from_beginning && found.to == joint.search->blocks()) ++beside.to;
     joint.beside.push_back(beside);
@@ -97,33 +91,7 @@ void ArmChanges::take(const FoundChainChange& found, const arm::ArmRecord& recor
     chain_.back().error_before = before;
     return;
   }
-  const std::string name = described(found.effect, rig_.chain);
-  out_.different.push_back(name);
-  out_.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                          ": it did not change within the record");
-}
-
-/// Each is named beside the other where both explain it alike.
-void ArmChanges::name_alike(FoundChainChange& of_chain, const ArmJoint& joint, FoundChange& own) const {
-  const double x = of_chain.score.gain, y = own.score.gain;
-  const double apart = std::fabs(double(of_chain.from) - double(own.from)) * settings_.block;
-  if (std::min(x, y) < settings_.alike * std::max(x, y) || apart > settings_.same_event) return;
-  of_chain.alike.push_back(own.effect.id + " of " + joint.name);
-  own.alike.push_back(described(of_chain.effect, rig_.chain));
-}
-
-/// Whether it is only what a change of the chain leaves in a joint: more load rubs more, and shapes are
-/// idealisations.
-bool ArmChanges::is_of_chain(const ArmJoint& joint, std::size_t place, const FoundChange& next) const {
-  const Change change = joint.search->change_of(next, joint.found, false);
-  const double start = joint.motion.start;
-  return std::any_of(chain_.begin(), chain_.end(), [&](const FoundChainChange& f) {
-    const bool together = change.since_from - settings_.same_event <= start + f.high &&
-                          start + f.low - settings_.same_event <= change.since_to;
-    const bool within = next.from >= f.from && next.from < f.to;
-    const double least = together ? settings_.least_beside : within ? settings_.least_further : 0;
-    return next.score.gain < least * f.shares[place];
-  });
+  add_different(described(found.effect, rig_.chain), out_);
 }
 
 /// The clearest change first, of one joint or of the chain; then those in what it leaves.
@@ -144,18 +112,11 @@ void ArmChanges::search(const arm::ArmRecord& record) {
     std::optional<FoundChainChange> of_chain;
     if (earlier_.size() < static_cast<std::size_t>(settings_.most_changes))
       of_chain = ChainSearch(joints, rig_.chain, settings_).best(earlier_);
-    if (of_chain && clearest < joints.size()) name_alike(*of_chain, joints[clearest], *next[clearest]);
     if (of_chain && (clearest == joints.size() || of_chain->score.gain > next[clearest]->score.gain)) {
       take(*of_chain, record);
       stale.assign(joints.size(), 1);
     } else if (clearest < joints.size()) {
-      ArmJoint& joint = joints[clearest];
-      if (is_of_chain(joint, clearest, *next[clearest])) {
-        joint.beside.push_back(*next[clearest]);
-        arm_->set_search(joint);
-      } else {
-        joint.search->add(*next[clearest], joint.found);
-      }
+      joints[clearest].search->add(*next[clearest], joints[clearest].found);
       stale[clearest] = 1;
     } else {
       return;
@@ -185,34 +146,16 @@ void ArmChanges::report_pushes(const arm::ArmRecord& record) {
       "nothing else");
 }
 
-/// What no effect explains, if it is small beside a change of the chain: under another load teeth ring and
-/// cross the gap in another way.
-bool ArmChanges::is_left_by_chain(const ArmJoint& joint, std::size_t place, const Change& change) const {
-  const double noise = joint.model.noise;
-  return change.effect == "unknown" &&
-         std::any_of(chain_.begin(), chain_.end(), [&](const FoundChainChange& f) {
-           const double from = joint.motion.start + f.low, rows = double(joint.motion.size());
-           const double explained = f.shares[place] * noise * noise / rows;  // mean square, at least
-           return change.since >= from - settings_.window &&
-                  change.error_after * change.error_after < settings_.least_explained * explained;
-         });
-}
-
 /// What one channel of a joint shows.
-void ArmChanges::add(const std::string& joint, const Changes& one, const ChangeSearch& search,
-                     const HealthyModel& model) {
+void ArmChanges::add(const std::string& joint, const Changes& one) {
   const auto named = [&](const std::string& text) { return joint + ": " + text; };
   for (const Change& c : one.changes) {
     out_.changes.push_back(c);
     out_.changes.back().joint = joint;
   }
   for (const std::string& warning : one.warnings) out_.warnings.push_back(named(warning));
-  for (const std::string& name : search.different()) {
-    out_.different.push_back(named(name));
-    out_.warnings.push_back(named("from its beginning the record differs from the healthy ones by " + name +
-                                  ": it did not change within the record"));
-  }
-  for (const ChangeEffect& e : model.further) out_.healthy_terms.push_back(named(e.name()));
+  for (const std::string& name : one.different) out_.different.push_back(named(name));
+  for (const std::string& name : one.healthy_terms) out_.healthy_terms.push_back(named(name));
   if (!one.cannot_tell.empty())
     out_.cannot_tell += (out_.cannot_tell.empty() ? "" : "; ") + named(one.cannot_tell);
 }
@@ -226,27 +169,13 @@ void ArmChanges::add_constant_error(const ArmJoint& joint, Change& change) const
       s.measured.standard_error = std::hypot(s.measured.standard_error, relative * s.measured.value);
 }
 
-void ArmChanges::report_joint(const ArmJoint& joint, std::size_t place) {
-  Changes one;
-  for (const FoundChange& f : joint.found)
-    one.changes.push_back(joint.search->change_of(f, joint.found, false));
-  report_unexplained(*joint.search, joint.found, false, settings_, one);
-  take_out_short(settings_, one);
-  std::vector<Change> kept;
-  for (Change& c : one.changes) {
-    add_constant_error(joint, c);
-    if (is_left_by_chain(joint, place, c))
-      one.warnings.push_back("since " + to_text(std::round(c.since)) +
-                             " s the record follows no effect, beside " +
-                             described(chain_.front().effect, rig_.chain));
-    else
-      kept.push_back(c);
-  }
-  one.changes = std::move(kept);
-  add(joint.name, one, *joint.search, joint.model);
-  out_.windows = std::max(out_.windows, joint.search->windows());
-  out_.threshold = joint.search->threshold(1);
-  out_.noise = std::max(out_.noise, joint.model.noise);
+void ArmChanges::report_joint(const ArmJoint& joint) {
+  Changes one = reported_changes(*joint.search, joint.found, false, false, settings_);
+  for (Change& c : one.changes) add_constant_error(joint, c);
+  add(joint.name, one);
+  out_.windows = std::max(out_.windows, one.windows);
+  out_.threshold = one.threshold;
+  out_.noise = std::max(out_.noise, one.noise);
 }
 
 /// N m, rms of what all joints leave while it lasts, beside all that is known by now.
@@ -304,12 +233,7 @@ void ArmChanges::report_deflection(std::size_t index) {
     const HealthyScores scores(model, settings_);
     ChangeSearch search(model, deflection->motion, change_effects(model.sampling), scores, {}, settings_,
                         progress_);
-    const std::vector<FoundChange> found = search.run();
-    Changes one;
-    for (const FoundChange& f : found) one.changes.push_back(search.change_of(f, found, false));
-    report_unexplained(search, found, true, settings_, one);
-    take_out_short(settings_, one);
-    add(name, one, search, model);
+    add(name, reported_changes(search, search.run(), true, false, settings_));
   } catch (const CannotIdentify& error) {
     out_.warnings.push_back("changes of the backlash of " + name + " are not judged: " + error.what());
   }
@@ -334,7 +258,7 @@ Changes ArmChanges::run(const std::vector<arm::ArmRecord>& healthy, const arm::A
   }
   arm_->read(record, out_);
   search(record);
-  for (std::size_t j = 0; j < joints().size(); ++j) report_joint(joints()[j], j);
+  for (const ArmJoint& joint : joints()) report_joint(joint);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) report_deflection(j);
   for (const FoundChainChange& f : chain_) out_.changes.push_back(change_of(f));
   add_scale();

@@ -105,16 +105,6 @@ double ChainSearch::noisier(const FoundChainChange& f) const {
 }
 
 bool ChainSearch::believed(const FoundChainChange& f) const {
-  double squares = 0;  // after the onset
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const Eigen::VectorXd left = backgrounds_[j].left();
-    for (Eigen::Index r = 0; r < left.size(); ++r) {
-      const double t = joints_[j].motion.time(r);
-      if (t >= settings_.block * double(f.from) && t < settings_.block * double(f.to))
-        squares += left[r] * left[r] / backgrounds_[j].variance;
-    }
-  }
-  if (f.score.gain < settings_.least_explained * squares) return false;
   const double hours = settings_.block * double(blocks_) / 3600;
   const double probability =
       std::clamp(settings_.false_alarms_per_hour * hours / double(effects_.size()), 1e-14, 0.1);
@@ -137,7 +127,7 @@ void ChainSearch::find_end(FoundChainChange& f, const Sums& sums) const {
     if (ended.to == f.to) return;
     refine(ended, sums);
   }
-  if (ended.score.gain > (1 + 5 * settings_.least_further) * f.score.gain) f = ended;
+  if (ended.score.gain > (1 + settings_.least_beside) * f.score.gain) f = ended;
 }
 
 void ChainSearch::set_onset(FoundChainChange& f, const Sums& sums) const {
@@ -199,8 +189,7 @@ std::optional<FoundChainChange> ChainSearch::chosen() const {
 bool ChainSearch::further(const FoundChainChange& f, const std::vector<FoundChainChange>& found) const {
   return std::all_of(found.begin(), found.end(), [&](const FoundChainChange& other) {
     const double apart = std::fabs(double(f.from) - double(other.from)) * settings_.block;
-    const double least = apart < settings_.same_event ? settings_.least_beside : settings_.least_further;
-    return f.score.gain >= least * other.score.gain;
+    return apart >= settings_.same_event || f.score.gain >= settings_.least_beside * other.score.gain;
   });
 }
 
@@ -213,11 +202,6 @@ std::optional<FoundChainChange> ChainSearch::best(const std::vector<FoundChainCh
   find_end(*found, sums);
   if (!plausible(*found)) return std::nullopt;
   set_onset(*found, sums);
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const EffectSums::Normal n = sums.joints[j].normal(found->from, found->to, backgrounds_[j]);
-    const Eigen::VectorXd& x = found->score.values;
-    found->shares.push_back(std::max(0.0, 2 * n.moment.dot(x) - x.dot(n.information * x)));
-  }
   return found;
 }
 

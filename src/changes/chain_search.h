@@ -30,7 +30,6 @@ struct FoundChainChange {
   ChainEffect effect;
   std::size_t from = 0, to = 0;  // blocks
   EffectSums::Score score;
-  std::vector<double> shares;  // of the gain, by joint
   double inflation = 1;
   double low = 0, high = 0;        // s, of the onset
   double error_before = 0;         // N m, rms of all joints without it, while it lasts

@@ -35,7 +35,6 @@ ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motio
   const Background with = background(beside_);
   first_.nuisances = with.columns;
   first_.spread = with.spread;
-  beside_columns_ = first_.nuisances.cols() - beside_column_;
   prepare_columns(motion_, candidates_);
 }
 
@@ -186,33 +185,38 @@ bool ChangeSearch::needs_wander(const FoundChange& f, const Background& b) const
   return without.size() != x.size() || without.dot(x) < settings_.least_steadily * x.squaredNorm();
 }
 
-/// Growth of friction that a healthy machine may have. Growth faster than its wander looks larger than it
-/// is.
-bool ChangeSearch::is_drift(const FoundChange& f) const {
-  const double span = settings_.block * double(f.to - f.from);
-  if (f.score.gain < settings_.over_healthy * scores_.most_growth(f.effect)) return true;
-  return std::fabs(f.score.values[0]) * span <
-         settings_.least_ramp * std::max(1.0, settings_.wander_time / span) * model_.drift;
-}
-
 bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
+  const double explained = f.score.gain * b.variance;
+  if (motion_.sampling.channel == ChangeChannel::torque) {
+    // Growth of friction that a healthy machine has.
+    if (f.effect.ramp && f.score.gain < settings_.over_healthy * scores_.most_growth(f.effect)) return false;
+    if (needs_wander(f, b)) return false;
+  }
   double rows = 0;
   const double squares = f.effect.at_place() ? left_at(f, b.left(), rows) : left_after(b, f.from, f.to, rows);
-  const double explained = f.score.gain * b.variance;
-  const bool torque = motion_.sampling.channel == ChangeChannel::torque;
-  if (torque && ((f.effect.ramp && is_drift(f)) || needs_wander(f, b))) return false;
   if (explained < settings_.least_explained * squares) return false;
   if (explained < rows * model_.least_change * model_.least_change) return false;
-  // More noise than in the healthy records lowers the gain.
-  const double all = b.left().squaredNorm(), left = std::max(all - explained, 0.0);
-  const double noisier = std::max(1.0, left / double(motion_.size()) / b.variance);
-  // So does noise that follows the effect for a whole window.
-  const Eigen::VectorXd beside = left_with(f, b);
-  const double own =
-      score_inflation(motion_, beside, *effect_columns(motion_, f.effect), b.variance, settings_.window);
+  // More noise than in the healthy records that follows the effect for a whole window lowers the gain.
+  const double noise = score_inflation(motion_, left_with(f, b), *effect_columns(motion_, f.effect),
+                                       b.variance, settings_.window);
   const bool one = model_.sampling.chain && model_.records->size() == 1;
-  return f.score.gain / std::max(f.inflation * noisier, own) >
+  return f.score.gain / std::max(f.inflation, noise) >
          (one ? settings_.learned_from_one : 1) * threshold(f.score.values.size());
+}
+
+EffectSums::Score ChangeSearch::score_of(const Eigen::MatrixXd& columns, const FoundChange& f,
+                                         const Background& b) const {
+  return EffectSums(motion_, columns, b, settings_.block, false).score(f.from, f.to, b);
+}
+
+/// Another effect, or one of another shape, instead where that explains so many times as much.
+bool ChangeSearch::take_better(FoundChange& f, const ChangeEffect& e, double times,
+                               const Background& b) const {
+  EffectSums::Score s = score_of(*effect_columns(motion_, e), f, b);
+  if (s.gain <= times * f.score.gain) return false;
+  f.effect = e;
+  f.score = std::move(s);
+  return true;
 }
 
 void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
@@ -223,12 +227,7 @@ void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
     for (int i = -5; i <= 5; ++i) {
       ChangeEffect e = f.effect;
       e.shape = middle + step * i;
-      if (e.shape < least) continue;
-      const EffectSums sums(motion_, *effect_columns(motion_, e), b, settings_.block, false);
-      EffectSums::Score s = sums.score(f.from, f.to, b);
-      if (s.gain <= f.score.gain) continue;
-      f.effect = e;
-      f.score = std::move(s);
+      if (e.shape >= least) take_better(f, e, 1, b);
     }
   }
 }
@@ -250,8 +249,7 @@ void ChangeSearch::refine(FoundChange& f, const Background& b) const {
 void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
   const std::optional<ChangeEffect> e = with_inertia(f.effect);
   if (!e) return;
-  EffectSums::Score s =
-      EffectSums(motion_, *effect_columns(motion_, *e), b, settings_.block, false).score(f.from, f.to, b);
+  EffectSums::Score s = score_of(*effect_columns(motion_, *e), f, b);
   if (s.values.size() == 0 || s.gain < f.score.gain + settings_.onset_drop * f.inflation) return;
   f.effect = *e;
   f.score = std::move(s);
@@ -272,16 +270,9 @@ void ChangeSearch::differ(FoundChange f) {
 
 /// A change of its own, not what the shape of an earlier one leaves.
 bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChange>& found) const {
-  for (const FoundChange& f : found) {
+  return std::none_of(found.begin(), found.end(), [&](const FoundChange& f) {
     const double apart = std::fabs(double(next.from) - double(f.from)) * settings_.block;
-    // What is left of a bump of another shape is at its place, and begins with any pass of it.
-    const bool same = apart < settings_.same_event || f.effect.at_place();
-    const double least = same ? settings_.least_beside : settings_.least_further;
-    if (next.gain < least * f.gain) return false;
-  }
-  return std::none_of(beside_.begin(), beside_.end(), [&](const FoundChange& f) {
-    const double apart = std::fabs(double(next.from) - double(f.from)) * settings_.block;
-    return apart < settings_.same_event && next.gain < settings_.least_with_other * f.gain;
+    return apart < settings_.same_event && next.gain < settings_.least_beside * f.gain;
   });
 }
 
@@ -360,13 +351,6 @@ Change ChangeSearch::change_of(const FoundChange& f, const std::vector<FoundChan
   change.gain = f.gain;
   onset_interval(f, sums_of(f, b), b, change);
   onset_with_left(f, b, change);
-  // Intervals of changes of one event contain each other's onset.
-  for (const FoundChange& o : others)
-    if (std::fabs(double(o.from) - double(f.from)) * settings_.block < settings_.same_event) {
-      change.since_from -= settings_.same_event / 2;
-      change.since_to += settings_.same_event / 2;
-      break;
-    }
   if (f.to < blocks_) change.until = motion_.start + settings_.block * double(f.to);
   double rows = 0;
   change.error_before = std::sqrt(left_after(b, f.from, f.to, rows) / std::max(rows, 1.0));

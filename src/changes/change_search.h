@@ -31,6 +31,7 @@ class ChangeSearch {
                const HealthyScores& scores, const std::vector<FoundChange>& beside,
                const ChangeSettings& settings, const Progress& progress);
 
+  const HealthyModel& model() const { return model_; }
   std::vector<FoundChange> run();
   /// The best change beside those that were found, if it is believed. What the record has from its beginning
   /// is no change from then on.
@@ -43,15 +44,16 @@ class ChangeSearch {
   double threshold(Eigen::Index values) const;
   std::size_t windows() const;
   Change change_of(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
-  bool explained(const std::vector<FoundChange>& all) const;
   /// There is a change most like a fault at one place, in which other effects have a share.
   bool like_fault() const { return like_fault_; }
   /// What is left beside these is louder than the healthy machine leaves.
   std::optional<LoudStretch> loud(const std::vector<FoundChange>& all) const;
-  /// The same over the rest of the record, in motion alike.
-  std::optional<LoudStretch> louder(const std::vector<FoundChange>& all) const;
+  /// The same over the rest of the record, in motion alike, where nothing was found.
+  std::optional<LoudStretch> louder() const;
   Change unknown(const LoudStretch& stretch) const;
   const std::vector<std::string>& different() const { return different_; }
+  /// So many columns of a background are of the machine itself and what it may wander by.
+  Eigen::Index own() const { return beside_column_; }
   /// Values of the columns that stand beside, `found` being so.
   std::vector<signal::Measured> beside(const std::vector<FoundChange>& found) const;
 
@@ -67,11 +69,12 @@ class ChangeSearch {
   Eigen::VectorXd left_with(const FoundChange& f, const Background& b) const;
   Eigen::VectorXd values_without_wander(const FoundChange& f, const Background& b) const;
   bool needs_wander(const FoundChange& f, const Background& b) const;
-  bool is_drift(const FoundChange& f) const;
   bool believed(const FoundChange& f, const Background& b) const;
   bool begins_before(const FoundChange& f, const Background& b) const;
   void differ(FoundChange f);
   bool further(const FoundChange& next, const std::vector<FoundChange>& found) const;
+  EffectSums::Score score_of(const Eigen::MatrixXd& columns, const FoundChange& f, const Background& b) const;
+  bool take_better(FoundChange& f, const ChangeEffect& e, double times, const Background& b) const;
   void refine(FoundChange& f, const Background& b) const;
   void refine_order(FoundChange& f, const Background& b) const;
   void refine_slip(FoundChange& f, const Background& b) const;
@@ -104,8 +107,8 @@ class ChangeSearch {
   const Progress& progress_;
   const std::vector<FoundChange> beside_;
   Whitened first_;
-  Eigen::Index beside_column_ = 0, beside_columns_ = 0;  // the first of what stands beside, and how many
-  std::vector<std::string> different_;                   // effects that the record has from its beginning
+  Eigen::Index beside_column_ = 0;      // the first of what stands beside
+  std::vector<std::string> different_;  // effects that the record has from its beginning
   bool like_fault_ = false;
   std::optional<FoundChange> left_by_shape_;  // the likeliest beside those found, too little to be reported
   const std::size_t margin_, blocks_;

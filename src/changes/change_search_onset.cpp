@@ -32,7 +32,7 @@ void ChangeSearch::find_end(FoundChange& f, const Background& b) const {
     refine(ended, b);
   }
   const double more = (ended.score.gain - f.score.gain) / f.inflation;
-  if (more > threshold(1) && ended.score.gain > (1 + 5 * settings_.least_further) * f.score.gain) f = ended;
+  if (more > threshold(1) && ended.score.gain > (1 + settings_.least_beside) * f.score.gain) f = ended;
 }
 
 /// Whether it may have begun before the record did.

@@ -43,11 +43,9 @@ std::optional<FoundChange> ChangeSearch::best_fault(const Background& b) const {
 
 void ChangeSearch::refine_fault(FoundChange& f, const Background& b) const {
   const ChangeChannel channel = motion_.sampling.channel;
-  const auto score = [&](const ChangeEffect& e) {
-    return EffectSums(motion_, *effect_columns(motion_, e), b, settings_.block, false).score(f.from, f.to, b);
-  };
   for (int round = 0; round < kRounds; ++round) {
-    const EffectSums::Score whole = score(fault_with_slopes(channel, f.effect, f.score.values));
+    const EffectSums::Score whole =
+        score_of(*effect_columns(motion_, fault_with_slopes(channel, f.effect, f.score.values)), f, b);
     if (whole.values.size() == 0) return;
     const double before = f.score.gain, width = f.effect.width;
     for (const double share : {1.0, 0.3}) {
@@ -55,12 +53,7 @@ void ChangeSearch::refine_fault(FoundChange& f, const Background& b) const {
       const double place = f.effect.shape + share * std::clamp(whole.values[2], -most, most);
       const double wide = std::clamp(width + share * std::clamp(whole.values[3], -most, most),
                                      screen_.narrowest(), screen_.widest());
-      const ChangeEffect e = local_fault(channel, place, wide);
-      EffectSums::Score s = score(e);
-      if (s.gain <= f.score.gain) continue;
-      f.effect = e;
-      f.score = std::move(s);
-      break;
+      if (take_better(f, local_fault(channel, place, wide), 1, b)) break;
     }
     if (f.score.gain < (1 + kBetter) * before) return;
   }
@@ -72,11 +65,7 @@ void ChangeSearch::refine_scale(FoundChange& f, const Background& b) const {
       for (int i = 0; i < 3; ++i) {
         ChangeEffect e = f.effect;
         e.shape *= by;
-        EffectSums::Score s = EffectSums(motion_, *effect_columns(motion_, e), b, settings_.block, false)
-                                  .score(f.from, f.to, b);
-        if (s.gain <= f.score.gain) break;
-        f.effect = e;
-        f.score = std::move(s);
+        if (!take_better(f, e, 1, b)) break;
       }
 }
 
@@ -86,11 +75,7 @@ void ChangeSearch::refine_slip(FoundChange& f, const Background& b) const {
   for (int round = 0; round < kRounds && f.score.values.size() > 0; ++round) {
     ChangeEffect e = f.effect;
     e.shape = f.score.values[0];
-    EffectSums::Score s =
-        EffectSums(motion_, *effect_columns(motion_, e), b, settings_.block, false).score(f.from, f.to, b);
-    if (s.gain <= (1 + kBetter) * f.score.gain) return;
-    f.effect = e;
-    f.score = std::move(s);
+    if (!take_better(f, e, 1 + kBetter, b)) return;
   }
 }
 
@@ -104,7 +89,7 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
   Eigen::MatrixXd both(z.size(), 2);
   both << z,
       f.score.values[0] / (2 * kSlope) * (*effect_columns(motion_, more) - *effect_columns(motion_, less));
-  const EffectSums::Score s = EffectSums(motion_, both, b, settings_.block, false).score(f.from, f.to, b);
+  const EffectSums::Score s = score_of(both, f, b);
   Eigen::Matrix2d covariance = Eigen::Vector2d(f.score.values.squaredNorm(), 1).asDiagonal();  // not known
   if (s.values.size() == 2) covariance = s.covariance * f.inflation * std::max(1.0, noisier);
   covariance(0, 0) += std::pow(settings_.model_error * f.score.values[0], 2);
@@ -149,8 +134,7 @@ std::vector<ChangeSize> ChangeSearch::fault_size(const FoundChange& f, const Bac
                                                  const Eigen::VectorXd& left, bool linear) const {
   const ChangeChannel channel = motion_.sampling.channel;
   const ChangeEffect with = fault_with_slopes(channel, f.effect, f.score.values);
-  const EffectSums sums(motion_, *effect_columns(motion_, with), b, settings_.block, false);
-  const EffectSums::Score whole = sums.score(f.from, f.to, b);
+  const EffectSums::Score whole = score_of(*effect_columns(motion_, with), f, b);
   double rows = 0;
   const double squares = left_at(f, left, rows), noisier = std::max(1.0, squares / rows / b.variance);
   const double model[] = {f.score.values.norm(), f.score.values.norm(), f.effect.width, f.effect.width};

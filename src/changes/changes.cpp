@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -20,49 +19,19 @@ struct ChannelChanges {
   Changes reported;
 };
 
-/// By how much the load of the teeth may have changed: what the motor's torque shows, on either side of the
-/// gap.
-std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& changes, double block) {
-  if (changes.empty()) return {};
-  std::vector<std::vector<OfMoment>> columns;
-  for (const FoundChange& f : changes) columns.push_back(f.effect.columns());
-  return [changes, columns, block](const Moment& m) {
-    double sum = 0;
-    for (std::size_t n = 0; n < changes.size(); ++n) {
-      const FoundChange& f = changes[n];
-      if (m.time < block * double(f.from) || m.time >= block * double(f.to)) continue;
-      if (f.effect.ramp) sum += f.score.values[0] * columns[n][0](m) * (m.time - block * double(f.from));
-      for (std::size_t i = 0; !f.effect.ramp && i < columns[n].size(); ++i)
-        sum += f.score.values[static_cast<Eigen::Index>(i)] * columns[n][i](m);
-    }
-    return sum;
-  };
-}
-
 ChannelChanges changes_in(const HealthyModel& model, const record::Record& record,
                           const std::vector<FoundChange>& beside, bool linear, const ChangeSettings& settings,
                           const Progress& progress) {
-  HealthyModel of_record = model;
-  of_record.sampling.other_load = other_load(beside, settings.block);
-  const SampledMotion motion = motion_by(of_record, record, settings);
+  const SampledMotion motion = motion_by(model, record, settings);
   const HealthyScores scores(model, settings);
   ChangeSearch search(model, motion, change_effects(model.sampling), scores, beside, settings, progress);
   ChannelChanges result;
   const std::vector<FoundChange>& found = result.found = search.run();
   result.beside = search.beside(found);
-  Changes& out = result.reported;
-  out.windows = search.windows();
-  out.threshold = search.threshold(1);
-  out.noise = model.noise;
-  for (const ChangeEffect& e : model.further) out.healthy_terms.push_back(e.name());
-  for (const FoundChange& f : found) out.changes.push_back(search.change_of(f, found, linear));
-  report_unexplained(search, found, model.sampling.mesh.has_value(), settings, out);
-  take_out_short(settings, out);
-  out.different = search.different();
-  for (const std::string& name : search.different())
-    out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                           ": it did not change within the record");
-  for (const DifferentValue& value : different_values(model, search.background(found), linear)) {
+  Changes& out = result.reported =
+      reported_changes(search, found, model.sampling.mesh.has_value(), linear, settings);
+  for (const DifferentValue& value :
+       different_values(model, search.background(found), search.own(), linear)) {
     if (std::find(out.different.begin(), out.different.end(), value.name) != out.different.end()) continue;
     out.different.push_back(value.name);
     out.cannot_tell += (out.cannot_tell.empty() ? "" : "; ") +
@@ -125,26 +94,6 @@ void add_deflection(const Changes& more, Changes& all) {
   all.cannot_tell += more.cannot_tell;
 }
 
-/// A change that one channel cannot name is reported once, whether the other names it or not.
-void unite_unknown(const ChangeSettings& settings, Changes& all) {
-  std::vector<Change> kept;
-  for (std::size_t i = 0; i < all.changes.size(); ++i) {
-    const Change& c = all.changes[i];
-    const auto same_event = [&](const Change& o) {
-      const bool together = o.since_from - settings.same_event <= c.since_to &&
-                            c.since_from - settings.same_event <= o.since_to;
-      return together && (o.effect != "unknown" || &o < &c);
-    };
-    const auto other = std::find_if(all.changes.begin(), all.changes.end(), same_event);
-    if (c.effect != "unknown" || other == all.changes.end())
-      kept.push_back(c);
-    else if (other->effect != "unknown")
-      all.warnings.push_back("since " + whole_seconds(c.since) + " the record follows no effect, beside " +
-                             other->effect);
-  }
-  all.changes = kept;
-}
-
 /// Two inertias: the torque first, as its changes may change the load of the teeth; then the deflection.
 Changes changes_of_two(const model::Rig& rig, double behind, const std::vector<record::Record>& healthy,
                        const record::Record& record, MotionSampling sampling, ChangeSettings settings,
@@ -195,7 +144,6 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
     out = changes_in(model, record, {}, rig.linear, settings, progress).reported;
   } else {
     out = changes_of_two(rig, behind, healthy, record, sampling, settings, progress);
-    unite_unknown(settings, out);
   }
   std::sort(out.changes.begin(), out.changes.end(),
             [](const Change& a, const Change& b) { return a.since < b.since; });

@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/signal/distributions.h"
+#include "channel_changes.h"
 #include "rig_scan.h"
 
 namespace backlash::changes {
@@ -16,10 +17,8 @@ namespace {
 
 using record::Channel;
 
-constexpr int kMostRefinements =
-    24;                              // further ones about onsets. Choice: five halves each, and room for more
-constexpr std::size_t kFewest = 4;   // stretches that must fit. Choice
-constexpr double kLeftByName = 0.2;  // of what all values together explain, that a name may leave. Choice
+constexpr std::size_t kFewest = 4;     // stretches that must fit. Choice
+constexpr double kLeftByName = 0.2;    // of what all values together explain, that a name may leave. Choice
 constexpr double kSureOfLeft = 0.999;  // chance that the others together explain no more than this of nothing
 constexpr double kMostUnexplained = 1.0 / 3;   // of the stretches, beside those that are reported. Choice
 constexpr std::size_t kFewestUnexplained = 3;  // in a row, that are a change. Choice: one may be odd
@@ -215,18 +214,6 @@ class RigChanges {
       out.warnings.push_back(text);
   }
 
-  void take_out_short(Changes& out) const {
-    const double shortest = double(settings_.least_windows) * settings_.window;
-    const auto is_short = [&](const Change& c) { return c.until && *c.until - c.since < shortest; };
-    for (const Change& c : out.changes)
-      if (is_short(c) && out.cannot_tell.empty())
-        out.cannot_tell = fmt::format(
-            "from {:.1f} to {:.1f} s the record differs from the healthy ones, too short to say by what "
-            "(nearest: {})",
-            c.since, *c.until, c.effect);
-    out.changes.erase(std::remove_if(out.changes.begin(), out.changes.end(), is_short), out.changes.end());
-  }
-
   Changes result() const {
     const RigScan s = scan();
     const RigScan::Found found = s.run();
@@ -236,12 +223,7 @@ class RigChanges {
     out.noise = rig_.residual[0];
     for (std::size_t i = 0; i < found.changes.size(); ++i)
       out.changes.push_back(change_of(s, found.changes[i], found.beside(i)));
-    for (const RigChange& d : found.different) {
-      const std::string& name = rig_.effects[d.effect].name;
-      out.different.push_back(name);
-      out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
-                             ": it did not change within the record");
-    }
+    for (const RigChange& d : found.different) add_different(rig_.effects[d.effect].name, out);
     if (const auto unexplained = s.unexplained(found)) {
       const std::string text =
           fmt::format("since {:.0f} s the values of the machine together are others, though none alone is",
@@ -250,7 +232,7 @@ class RigChanges {
     }
     report_unknown(out);
     report_unjudged(out);
-    take_out_short(out);
+    take_out_short(settings_, out);
     std::sort(out.changes.begin(), out.changes.end(),
               [](const Change& a, const Change& b) { return a.since < b.since; });
     return out;

@@ -7,12 +7,12 @@
 #include "backlash_diagnosis/base/text.h"
 
 namespace backlash::changes {
+namespace {
 
+/// "37 s"
 std::string whole_seconds(double time) {
   return to_text(std::round(time)) + " s";
 }
-
-namespace {
 
 double rounded(double x) {
   return std::round(10 * x) / 10;
@@ -37,12 +37,10 @@ void report_loud(const ChangeSearch& search, const LoudStretch& loud, std::vecto
       "motion of this kind";
 }
 
-/// Where it is louder than in the rest, but less than that. More than the changes explain is not their
-/// shape.
-void report_louder(const ChangeSearch& search, const std::vector<FoundChange>& found, double explained,
-                   Changes& out) {
-  const std::optional<LoudStretch> louder = search.louder(found);
-  if (!louder || louder->excess < explained) return;
+/// Where it is louder than in the rest, but less than that.
+void report_louder(const ChangeSearch& search, Changes& out) {
+  const std::optional<LoudStretch> louder = search.louder();
+  if (!louder) return;
   const Change unknown = search.unknown(*louder);
   const std::string until = unknown.until ? " to " + whole_seconds(*unknown.until) : "";
   out.cannot_tell =
@@ -50,15 +48,11 @@ void report_louder(const ChangeSearch& search, const std::vector<FoundChange>& f
       to_text(rounded(std::sqrt(louder->times))) +
       " times as far from the healthy ones, farther than in the rest of it in motion alike, and "
       "follows no effect";
-  for (const FoundChange& f : found) out.cannot_tell += ", nearest: " + f.effect.id;
-  out.changes.clear();
 }
-
-}  // namespace
 
 void report_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
                         const ChangeSettings& settings, Changes& out) {
-  std::optional<LoudStretch> loud = search.loud(found);
+  const std::optional<LoudStretch> loud = search.loud(found);
   double explained = 0;
   std::vector<std::string> nearest;
   for (const FoundChange& f : found) {
@@ -66,23 +60,40 @@ void report_unexplained(const ChangeSearch& search, const std::vector<FoundChang
     nearest.push_back(f.effect.id);
   }
   if (search.like_fault()) nearest.emplace_back(kLocalFault);
-  if (search.explained(found) && !(loud && loud->excess > explained)) {
-    if (loud && !found.empty())
-      out.warnings.push_back("since " + whole_seconds(search.unknown(*loud).since) +
-                             " the record follows no effect, beside " + joined(nearest));
-    else if (loud)
-      report_loud(search, *loud, {}, of_two, settings, out);
-    else
-      report_louder(search, found, explained, out);
-    return;
-  }
-  out.changes.clear();
-  loud = search.loud({});
-  if (loud)
-    report_loud(search, *loud, nearest, of_two, settings, out);
-  else
+  if (loud && loud->excess > explained) {
+    out.changes.clear();
+    report_loud(search, search.loud({}).value_or(*loud), nearest, of_two, settings, out);
+  } else if (loud) {
+    out.warnings.push_back("since " + whole_seconds(search.unknown(*loud).since) +
+                           " the record follows no effect, beside " + joined(nearest));
+  } else if (search.like_fault()) {
     out.cannot_tell = "the record differs from the healthy ones in a way that no effect explains (nearest: " +
                       joined(nearest) + "): commission with more motion of this kind";
+  } else if (found.empty()) {
+    report_louder(search, out);
+  }
+}
+
+}  // namespace
+
+Changes reported_changes(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
+                         bool linear, const ChangeSettings& settings) {
+  Changes out;
+  out.windows = search.windows();
+  out.threshold = search.threshold(1);
+  out.noise = search.model().noise;
+  for (const ChangeEffect& e : search.model().further) out.healthy_terms.push_back(e.name());
+  for (const FoundChange& f : found) out.changes.push_back(search.change_of(f, found, linear));
+  report_unexplained(search, found, of_two, settings, out);
+  take_out_short(settings, out);
+  for (const std::string& name : search.different()) add_different(name, out);
+  return out;
+}
+
+void add_different(const std::string& name, Changes& out) {
+  out.different.push_back(name);
+  out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
+                         ": it did not change within the record");
 }
 
 void take_out_short(const ChangeSettings& settings, Changes& out) {

@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/signal/measured.h"
@@ -25,38 +25,52 @@ struct Named {
   double times;  // of the column's value, that of the parameter
 };
 
+/// What the record shows more of each lasting column over all of it, whichever of the columns takes it:
+/// friction that is 0.1 less for good and 0.1 more while it warms up is the same friction.
+struct Lasting {
+  Eigen::VectorXd more;
+  Eigen::MatrixXd errors, spread;  // covariances: of the record's noise, and of healthy records
+};
+
+Lasting lasting_of(const Background& b, Eigen::Index lasting, Eigen::Index own) {
+  const auto all = b.columns.leftCols(own), first = b.columns.leftCols(lasting);
+  Eigen::MatrixXd squares = first.transpose() * first;
+  squares.diagonal().array() *= 1 + 1e-9;  // what the motion does not show
+  squares.diagonal().array() += 1e-300;
+  const Eigen::MatrixXd shares = squares.ldlt().solve(first.transpose() * all);
+  return {shares * b.estimate.head(own), shares * b.inverse.topLeftCorner(own, own) * shares.transpose(),
+          shares * b.spread.head(own).cwiseAbs2().asDiagonal() * shares.transpose()};
+}
+
 /// Relative to the healthy value; 0 where it is not clear.
-signal::Measured difference(const HealthyModel& model, const Background& b, int column) {
-  const double by = b.estimate[column], error = std::sqrt(b.inverse(column, column)),
-               healthy = model.values[column];
-  const bool clear = std::fabs(by) > kClear * std::max(model.spread[column], error) &&
-                     std::fabs(by) > kLeast * std::fabs(healthy);
+signal::Measured difference(const HealthyModel& model, const Lasting& l, int column) {
+  const double by = l.more[column], error = std::sqrt(l.errors(column, column)),
+               spread = std::sqrt(l.spread(column, column)), healthy = model.values[column];
+  const bool clear =
+      std::fabs(by) > kClear * std::max(spread, error) && std::fabs(by) > kLeast * std::fabs(healthy);
   return clear && healthy != 0 ? signal::Measured{by / healthy, error / std::fabs(healthy)}
                                : signal::Measured{0, 0};
 }
 
 }  // namespace
 
-std::vector<DifferentValue> different_values(const HealthyModel& model, Background background, bool linear) {
-  // No prior: values of another machine must not be drawn to those of the healthy one.
-  background.spread.head(kCommonColumns).setConstant(std::numeric_limits<double>::infinity());
-  if (model.sampling.channel == ChangeChannel::deflection)
-    background.spread[kHalfGap] = std::numeric_limits<double>::infinity();
-  background.solve();
+std::vector<DifferentValue> different_values(const HealthyModel& model, const Background& background,
+                                             Eigen::Index own, bool linear) {
   const std::vector<Named> torque = {{kInertia, "inertia", "kg m^2", 1},
                                      {kCoulomb, "motor_coulomb", "N m", 1},
                                      {kViscous, "motor_viscous", "N m s/rad", 1}},
                            deflection = {{kHalfGap, "backlash", "rad", 2}};
   const bool of_torque = model.sampling.channel == ChangeChannel::torque;
+  const Lasting lasting = lasting_of(background, of_torque ? kCommonColumns : kScale + 1, own);
   std::vector<DifferentValue> all;
   std::vector<signal::Measured> factors;
   for (const Named& n : of_torque ? torque : deflection) {
-    const signal::Measured by = difference(model, background, n.column);
+    const signal::Measured by = difference(model, lasting, n.column);
     if (by.value == 0) continue;
     factors.push_back(by);
-    all.push_back({n.name, fmt::format("{} by {:.3g} {} (healthy: {:.3g})", n.name,
-                                       n.times * background.estimate[n.column],
-                                       model::axis_unit(n.unit, linear), n.times * model.values[n.column])});
+    all.push_back(
+        {n.name, fmt::format("{} by {:.3g} {} (healthy: {:.3g})", n.name, n.times * lasting.more[n.column],
+                             model::axis_unit(n.unit, linear), n.times * model.values[n.column])});
   }
   if (factors.size() < 2) return all;
   const signal::Measured best =

@@ -15,8 +15,9 @@ struct DifferentValue {
 };
 
 /// The values of the record, by a background that holds the changes within it, against those of the healthy
-/// machine: what differs by more than healthy records do, its errors and a quarter. A torque of which all
-/// parts differ by one factor is another gain of the torque.
-std::vector<DifferentValue> different_values(const HealthyModel& model, Background background, bool linear);
+/// machine: what differs by more than healthy records do, its errors and a quarter. Its first `own` columns
+/// are of the machine itself. A torque of which all parts differ by one factor is another gain of the torque.
+std::vector<DifferentValue> different_values(const HealthyModel& model, const Background& background,
+                                             Eigen::Index own, bool linear);
 
 }  // namespace backlash::changes

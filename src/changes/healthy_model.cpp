@@ -217,22 +217,6 @@ void set_noise(const PooledFit& fit, const ChangeSettings& settings, HealthyMode
   }
 }
 
-/// The line of squares over roughness, both of its values >= 0.
-void set_expected_squares(const ChangeSettings& settings, HealthyModel& model) {
-  std::vector<double> rough, squares;
-  for (std::size_t r = 0; r < model.left.size(); ++r)
-    for (Eigen::Index i = 0; i < model.left[r].size(); ++i) {
-      rough.push_back((*model.records)[r].moment(i).roughness);
-      squares.push_back(model.left[r][i] * model.left[r][i]);
-    }
-  const auto rows = static_cast<Eigen::Index>(rough.size());
-  const Eigen::Map<const Eigen::ArrayXd> x(rough.data(), rows), y(squares.data(), rows);
-  const double most = (1 - settings.least_steady) * y.mean() / x.mean();
-  const double slope = ((x - x.mean()) * y).sum() / (x - x.mean()).square().sum();
-  model.rough = std::isfinite(slope) ? std::clamp(slope, 0.0, most) : 0;
-  model.steady = y.mean() - model.rough * x.mean();
-}
-
 double rms_about_offset(const HealthyData& data, const PooledFit& fit) {
   double squares = 0;
   for (const SampledMotion& m : data.motions)
@@ -275,7 +259,6 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
   for (const SampledMotion& m : *model.records)
     m.known_columns.clear();  // of all effects: few are needed again
   set_noise(fit, settings, model);
-  set_expected_squares(settings, model);
   return model;
 }
 
@@ -303,13 +286,6 @@ SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
   set_loads(model.values, motion);
   set_torques(model, motion);
   return motion;
-}
-
-Eigen::VectorXd expected_squares(const HealthyModel& model, const SampledMotion& motion) {
-  Eigen::VectorXd out(motion.size());
-  for (Eigen::Index i = 0; i < out.size(); ++i)
-    out[i] = model.steady + model.rough * motion.moment(i).roughness;
-  return out;
 }
 
 }  // namespace backlash::changes

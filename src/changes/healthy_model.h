@@ -20,8 +20,6 @@ struct HealthyModel {
   Eigen::VectorXd values;
   Eigen::VectorXd spread;   // standard deviation from record to record
   double noise = 0;         // N m or rad, rms of `left`; of an arm of all that the values leave
-  double steady = 0;        // (N m)^2 or rad^2, squares of the residual in the smoothest motion
-  double rough = 0;         // what each rad^2/s^6 of the motion's roughness adds to them
   double drift = 0;         // N m, spread of a linear drift of dry friction over a record
   double least_change = 0;  // N m or rad, rms of what a change has to explain
   std::shared_ptr<const std::vector<SampledMotion>> records;  // that it was commissioned with
@@ -43,9 +41,6 @@ double compliance_of(const HealthyModel& model);
 /// With `load` of each moment by the model.
 SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
                         const ChangeSettings& settings);
-
-/// Squares of the healthy machine's residual in each row: more where the motion is rough.
-Eigen::VectorXd expected_squares(const HealthyModel& model, const SampledMotion& motion);
 
 /// Residual of the model and its nuisances: columns of its values and what drifts.
 struct Whitened {

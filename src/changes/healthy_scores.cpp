@@ -5,13 +5,6 @@
 #include <algorithm>
 
 namespace backlash::changes {
-namespace {
-
-constexpr double kAlike =
-    0.25;  // - of a value, by which a difference is none: choice, that of different_values.cpp
-
-}  // namespace
-
 HealthyScores::HealthyScores(const HealthyModel& model, const ChangeSettings& settings)
     : records_(model.records),
       left_(model.left),
@@ -56,7 +49,6 @@ bool HealthyScores::is_healthy(const ChangeEffect& effect, const EffectSums::Sco
     shown = true;
     const Eigen::VectorXd by = found.values - own.values;
     const Eigen::MatrixXd covariance = found.covariance + own.covariance;
-    if (by.norm() < kAlike * found.values.norm()) return true;
     if (by.dot(covariance.ldlt().solve(by)) < inflation * threshold) return true;
   }
   return !shown;

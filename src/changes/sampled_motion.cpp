@@ -92,10 +92,8 @@ bool rests_on_flank(const SampledMotion& motion, std::size_t k) {
   if (!motion.sampling.mesh || k == 0) return true;
   const Moment &now = motion.moments[k], &before = motion.moments[k - 1];
   if (now.side() != before.side()) return false;
-  if (motion.sampling.channel == ChangeChannel::torque) return true;
-  const double least = motion.sampling.mesh->least;
-  const double other = now.mesh + (motion.sampling.other_load ? motion.sampling.other_load(now) : 0);
-  return std::min(std::fabs(now.mesh), now.side() * other) > least;
+  return motion.sampling.channel == ChangeChannel::torque ||
+         std::fabs(now.mesh) > motion.sampling.mesh->least;
 }
 
 /// Samples that are present, move and rest on a flank, as do those within `guard` about them.
@@ -138,17 +136,6 @@ void thin(EvenSamples& even, std::size_t n, double interval) {
   even.there = there;
 }
 
-/// Mean squares about each value, `reach` to either side.
-std::vector<double> squares_about(const std::vector<double>& values, std::size_t reach) {
-  std::vector<double> sums = {0}, out;
-  for (const double x : values) sums.push_back(sums.back() + x * x);
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    const std::size_t from = k > reach ? k - reach : 0, to = std::min(values.size(), k + reach + 1);
-    out.push_back((sums[to] - sums[from]) / double(to - from));
-  }
-  return out;
-}
-
 void add_moments(const EvenSamples& even, const ChangeSettings& settings, SampledMotion& motion) {
   const MotionSampling& sampling = motion.sampling;
   const double dt = sampling.interval, turn = settings.friction_speed * sampling.speed;
@@ -158,8 +145,6 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
   const std::vector<double> position = filtered(even.position), speed = signal::derivative(position, dt),
                             acceleration = signal::derivative(speed, dt),
                             jerk = signal::derivative(acceleration, dt);
-  const std::vector<double> roughness =
-      squares_about(jerk, static_cast<std::size_t>(std::lround(settings.rough / dt)));
   const std::vector<double> parting =
       signal::derivative(signal::derivative(filtered(even.deflection), dt), dt);
   double way = kLongSince;
@@ -170,7 +155,6 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
                 speed[k],
                 acceleration[k] - sampling.behind * parting[k],
                 jerk[k],
-                roughness[k],
                 std::tanh(speed[k] / turn),
                 way,
                 0,

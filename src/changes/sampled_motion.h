@@ -25,23 +25,19 @@ struct MeshLoad {
   double least = 0;  // N m: less presses no flank for certain
 };
 
-struct Moment;
-
 /// Common to all records of a machine.
 struct MotionSampling {
   ChangeChannel channel = ChangeChannel::torque;
   double behind = 0;             // - of the inertia that moves with the load's encoder; 0: there is none
   std::optional<MeshLoad> mesh;  // none: one inertia, or not known yet
   bool chain = false;            // records state as output_torque what the rest of an arm takes
-  /// N m, that the teeth may bear beside; a flank counts that is pressed with it and without. Empty: nothing.
-  std::function<double(const Moment&)> other_load;
-  double interval = 0;         // s, of what is looked at
-  std::size_t thinned = 1;     // samples of the record in one of these
-  double cutoff = 0;           // Hz
-  double position_cutoff = 0;  // Hz
-  double speed = 1;            // rad/s, rms of the healthy machine
-  double fastest = 0;          // rad/s, beyond which nothing is judged; 0: no limit
-  double hardest = 0;          // rad/s^2, the same of accelerations
+  double interval = 0;           // s, of what is looked at
+  std::size_t thinned = 1;       // samples of the record in one of these
+  double cutoff = 0;             // Hz
+  double position_cutoff = 0;    // Hz
+  double speed = 1;              // rad/s, rms of the healthy machine
+  double fastest = 0;            // rad/s, beyond which nothing is judged; 0: no limit
+  double hardest = 0;            // rad/s^2, the same of accelerations
 };
 
 struct Moment {
@@ -50,7 +46,6 @@ struct Moment {
   double speed;         // rad/s
   double acceleration;  // rad/s^2, the mean of both inertias by their weight
   double jerk;          // rad/s^3
-  double roughness;     // rad^2/s^6, mean square of that about the moment
   double direction;     // -1..1
   double way;           // rad, since the last reversal
   double load;          // N m, that the healthy machine's load takes

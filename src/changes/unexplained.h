@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A stretch of a record that is louder than the healthy machine is in such motion: whatever happens there, no
+// A stretch of a record that is louder than the healthy machine is: whatever happens there, no
 // effect that was tried explains it.
 #pragma once
 
@@ -19,9 +19,9 @@ struct LoudStretch {
   double gain = 0;    // twice the log likelihood ratio of another variance inside
 };
 
-/// `times`: s, of rows; `squares`: of what is left there over what the healthy machine leaves in such motion,
-/// mean 1. The likeliest stretch of at least ChangeSettings::least_windows windows that is
-/// ChangeSettings::unknown_louder times as loud as a healthy machine, and as the rest of the record.
+/// `times`: s, of rows; `squares`: of what is left there over what the healthy machine leaves, mean 1. The
+/// likeliest stretch of at least ChangeSettings::least_windows windows that is ChangeSettings::unknown_louder
+/// times as loud as a healthy machine, and as the rest of the record.
 std::optional<LoudStretch> loud_stretch(const std::vector<double>& times, const std::vector<double>& squares,
                                         const ChangeSettings& settings);
 

@@ -43,11 +43,8 @@ struct ChangeSettings {
   double drift = 0.1;         // - of dry friction over a record, by temperature. Choice
   // Dry and viscous friction wander from minute to minute. Bittencourt and Axelsson (LiTH-ISY-R-3058) measure
   // more by temperature alone. Choices.
-  double wander = 0.03;      // -, of each, standard deviation
-  double wander_time = 100;  // s, over which
-  double rough = 0.15;  // s to either side, over which the motion's roughness is taken. Simulation: teeth
-                        // that cross the gap ring for as long, and so do ends of moves
-  double least_steady = 0.1;  // - of the squares of the residual, that no roughness explains. Choice
+  double wander = 0.03;       // -, of each, standard deviation
+  double wander_time = 100;   // s, over which
   double chain_share = 0.02;  // - of what the rest of an arm takes, that a joint may show otherwise. Choice:
                               // torque constants fall by as much as windings warm up by 10 K (magnets 0.1 to
                               // 0.2 %/K)
@@ -64,9 +61,7 @@ struct ChangeSettings {
   double block = 0.2;  // s, resolution of the onset. Choice
   double margin = 8;   // s at either end in which no change begins. Choice
   double least_explained = 0.1;  // - of the squares of the residual after the onset. Choice
-  double least_ramp = 1.5;  // of `drift`, that friction grows by. Simulation: friction that wanders by 2 %
-                            // from minute to minute looks like 1.3
-  double over_healthy = 2;  // of the largest gain that growth of friction has in a healthy record. Choice
+  double over_healthy = 2;      // of the largest gain that growth of friction has in a healthy record. Choice
   double least_steadily = 0.5;  // - of a change that shows where friction may not wander. Choice
   double learned_from_one = 2;  // of the threshold, of a joint of an arm of which one record is healthy: how
                                 // far another task is from it is not known. Measured: a UR10e needs 1.6
@@ -74,20 +69,16 @@ struct ChangeSettings {
                                 // ring and cross the gap leave as much. Choice
   double errors_of_side = 4;    // standard errors of the share of friction that loads the teeth. Choice
   double worst_side = 0.4;      // -, of that share from 0 or 1, with its errors. Choice: 0.5 is neither
-  double least_further =
-      0.05;               // - of the first change's gain. Simulation: what a first one leaves by its shape
-  double undone = 0.3;    // - of a change's size, that one which takes it back may leave. Choice
-  double same_event = 5;  // s: two that begin so close may be one whose shape is another. Choice
-  double least_with_other = 1e-3;  // - of the gain of the other channel's change of the same event. Choice
-  double least_beside = 0.25;      // - of the gain of the other that a second one of an event has. Choice
-  double errors_of_mass = 4;       // standard errors, by which a payload has a mass. Choice
-  double largest_slip = 0.3;       // rad, of an encoder. Theory: its sine is 1.5 % smaller
-  double farthest_centre = 2;      // m from its joint, that a payload's centre may be. Choice
-  int most_changes = 4;            // Choice
-  double onset_drop = 8;      // of twice the log likelihood, as wide as the onset is uncertain. Simulation
-  double onset_least = 0.1;   // s, half of the narrowest interval. Choice
-  double unknown_left = 0.4;  // - of the squares after the onset that may be left. Choice
-  // Squares of the residual over those of healthy motion as rough, of what no effect explains: beyond it the
+  double undone = 0.3;          // - of a change's size, that one which takes it back may leave. Choice
+  double same_event = 5;        // s: two that begin so close may be one whose shape is another. Choice
+  double least_beside = 0.25;   // - of the gain of the other that a second one of an event has. Choice
+  double errors_of_mass = 4;    // standard errors, by which a payload has a mass. Choice
+  double largest_slip = 0.3;    // rad, of an encoder. Theory: its sine is 1.5 % smaller
+  double farthest_centre = 2;   // m from its joint, that a payload's centre may be. Choice
+  int most_changes = 4;         // Choice
+  double onset_drop = 8;        // of twice the log likelihood, as wide as the onset is uncertain. Simulation
+  double onset_least = 0.1;     // s, half of the narrowest interval. Choice
+  // Squares of the residual over those of the healthy machine, of what no effect explains: beyond it the
   // answer is "cannot tell", or a change. Choices. Simulation of healthy machines in other tasks: one inertia
   // 2, two 5.
   double unknown_louder = 4, unknown_of_two = 16;

@@ -28,7 +28,6 @@ constexpr double kStream = 1800;                               // s, of one join
 struct Options {
   double hours = 0, rate = 1.0 / 720;  // h, 1/h
   bool apart = false;
-  double least_explained = changes::ChangeSettings().least_explained;
   OnsetOptions onsets;
   int arms = 0;
   bool rough = false;
@@ -37,9 +36,8 @@ struct Options {
   MadeOptions made;
 };
 
-changes::ChangeSettings settings_of(double rate, double least_explained) {
+changes::ChangeSettings settings_of(double rate) {
   changes::ChangeSettings settings;
-  settings.least_explained = least_explained;
   settings.false_alarms_per_hour = rate;
   return settings;
 }
@@ -79,8 +77,8 @@ void healthy(const Options& options) {
       const double from = std::max(0.0, to - kWindow);
       ++looks;
       try {
-        const auto found = changes::detect_changes(joint.rig(), learned, stream.slice(from, to),
-                                                   settings_of(rate, options.least_explained));
+        const auto found =
+            changes::detect_changes(joint.rig(), learned, stream.slice(from, to), settings_of(rate));
         suspected += !found.changes.empty();
         cannot += found.changes.empty() && !found.cannot_tell.empty();
         ledger.take(look_of(found, from, to));
@@ -124,8 +122,8 @@ void healthy_apart(const Options& options) {
     const record::Record stream = joint.record(random, kStream, true, true);
     for (double from = 0; from + kWindow <= kStream; from += kWindow) {
       const record::Record look = slice_of_motion(stream, from, options.made.sampling);
-      const changes::Changes found = changes::detect_changes(
-          joint.rig(), learned, look, settings_of(options.rate, options.least_explained));
+      const changes::Changes found =
+          changes::detect_changes(joint.rig(), learned, look, settings_of(options.rate));
       ++looks;
       windows += static_cast<long>(found.windows);
       wrong += !found.changes.empty();
@@ -160,8 +158,6 @@ int main(int argc, char** argv) {
   add("healthy-hours", po::value(&options.hours), "of healthy joints");
   add("false-alarms-per-hour", po::value(&options.rate), "that are allowed; default 1/720");
   add("apart", po::bool_switch(&options.apart), "looks that share no samples, each an alarm by itself");
-  add("least-explained", po::value(&options.least_explained),
-      "of the squares, see ChangeSettings; default 0.1");
   add("onsets", po::value(&options.onsets.count), "joints that change once");
   add("arms", po::value(&options.arms), "of six joints, healthy, and as many for each kind of change");
   add("only", po::value(&options.onsets.only), "this kind of change");
