@@ -131,26 +131,59 @@ double most_left(const OutputError& fit) {
   return most;
 }
 
-/// The machine with the same values and Hertzian teeth, fitted; nothing where they leave more.
-std::optional<OutputError> with_hertzian_fit(const OutputError& fit, const std::vector<ServoData>& data,
-                                             OutputErrorSettings settings) {
-  double torque = 0;  // N m, standard deviation
+/// N m, standard deviation.
+double motor_torque(const std::vector<ServoData>& data) {
+  double torque = 0;
   for (const ServoData& d : data) torque = std::max(torque, spread(d.torque) / std::sqrt(double(d.size())));
-  const auto teeth = with_hertzian_teeth(fit.rig, torque);
-  if (!teeth) return std::nullopt;
+  return torque;
+}
+
+/// N m, standard deviation of what goes through the teeth.
+double mesh_torque(const OutputError& fit) {
+  double torque = 0;
+  for (const ServoPrediction& p : fit.predictions)
+    torque = std::max(torque, spread(p.load.mesh_torque) / std::sqrt(double(p.load.mesh_torque.size())));
+  return torque;
+}
+
+/// The machine with the same values and Hertzian teeth, fitted; nothing where the fit fails, and leaves more
+/// than what it began with.
+std::optional<OutputError> hertzian_fit(const model::Rig& teeth, const OutputError& fit,
+                                        const std::vector<ServoData>& data, OutputErrorSettings settings) {
   settings.findings.clear();
   settings.parameters.clear();
   for (const rig_file::RigParameter& p : rig_file::servo_parameters())
-    if (p.known_to(*teeth) && (!p.contact.empty() || fit.parameters.count(p.name) > 0))
+    if (p.known_to(teeth) && (!p.contact.empty() || fit.parameters.count(p.name) > 0))
       settings.parameters.push_back(p.name);
   try {
-    OutputError other = fit_output_error(*teeth, data, settings);
-    if (most_left(other) < most_left(fit)) return other;
+    OutputError begin = fit, other = fit_output_error(teeth, data, settings);
+    for (std::size_t i = 0; i < data.size(); ++i)
+      begin.predictions[i] = predict_servo(teeth, data[i], settings.fit, fit.calibrations[i]);
+    if (most_left(other) <= most_left(begin)) return other;
   } catch (const CannotIdentify&) {
   } catch (const InvalidParameter&) {  // values that no machine has
   } catch (const IntegrationError&) {  // or with which the load runs away
   }
   return std::nullopt;
+}
+
+/// Where teeth of another law cannot be fitted. Those whose force grows with the power 1.5 of the penetration
+/// x have the slope of linear ones of depth d where x = 1.5 d: each flank lies nearer by d / 2, and the force
+/// there over x is two thirds of the slope. Between both laws all are as likely.
+void allow_for_unknown_teeth(const OutputError& fit, Identification& result) {
+  const double uniform = 1 / std::sqrt(3.0);  // standard deviation about the end of a range of 1
+  const auto widen = [&](rig_file::ParameterKind kind, double difference) {
+    const auto at = result.parameters.find(rig_file::servo_parameter(rig_file::RigPart::mesh, kind).name);
+    if (at == result.parameters.end()) return;
+    at->second.standard_error = std::hypot(at->second.standard_error, uniform * difference);
+  };
+  const double stiffness =
+      rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness).get(fit.rig);
+  widen(rig_file::ParameterKind::backlash, mesh_torque(fit) / stiffness);
+  widen(rig_file::ParameterKind::stiffness, stiffness / 3);
+  result.warnings.emplace_back(
+      "whether the teeth are linear, as declared, or Hertzian is not distinguishable: the errors of play and "
+      "stiffness allow for both");
 }
 
 /// Where teeth of another law leave less, no value is known better than by the difference between the laws.
@@ -222,8 +255,13 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   if (lacks_something(d) || lacks_something(t)) {
     for (auto& [name, value] : c.result.parameters)
       allow_for_declared(rig_file::servo_parameter(name).get(c.declared), value);
-    if (const auto other = with_hertzian_fit(fit, data, settings))
-      allow_for_other_teeth(fit, *other, c.result);
+    if (const auto teeth = with_hertzian_teeth(fit.rig, motor_torque(data))) {
+      const auto other = hertzian_fit(*teeth, fit, data, settings);
+      if (!other)
+        allow_for_unknown_teeth(fit, c.result);
+      else if (most_left(*other) < most_left(fit))
+        allow_for_other_teeth(fit, *other, c.result);
+    }
     c.result.several = contradicting(c, data, report.records, most_left(c.result.channels), settings);
     if (c.result.several) allow_for_several(*c.result.several, c.result.parameters);
   }
