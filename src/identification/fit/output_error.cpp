@@ -62,6 +62,9 @@ Machine start_machine(const model::Rig& rig, const std::vector<ServoData>& recor
   machine.rig = rig;
   machine.calibrations.resize(records.size());
   if (locked) know_lock(machine, records);
+  if (simulation::load_moves_freely(rig))  // zeros of encoders may lie many gaps apart
+    for (std::size_t i = 0; i < records.size(); ++i)
+      machine.calibrations[i].encoder_offset = middle_offset(records[i]);
   for (const std::string& name : settings.parameters)
     machine.parameters.push_back(machine_parameter(name, machine.rig));
   if (rig.coupled) machine.priors = rows_as_declared(rig);

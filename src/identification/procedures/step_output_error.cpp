@@ -167,20 +167,26 @@ std::optional<OutputError> hertzian_fit(const model::Rig& teeth, const OutputErr
   return std::nullopt;
 }
 
-/// Where teeth of another law cannot be fitted. Those whose force grows with the power 1.5 of the penetration
-/// x have the slope of linear ones of depth d where x = 1.5 d: each flank lies nearer by d / 2, and the force
-/// there over x is two thirds of the slope. Between both laws all are as likely.
+/// Of a value of the mesh, where another law of the teeth may hold.
+void widen(Identification& result, rig_file::ParameterKind kind, double difference) {
+  const auto at = result.parameters.find(rig_file::servo_parameter(rig_file::RigPart::mesh, kind).name);
+  if (at == result.parameters.end()) return;
+  at->second.standard_error = std::hypot(at->second.standard_error, difference);
+}
+
+/// Force over penetration, where the force grows with the power 1.5, is two thirds of the slope.
+double secant_of_slope(const OutputError& fit) {
+  const auto stiffness =
+      rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness);
+  return stiffness.get(fit.rig) / 3;
+}
+
+/// Where Hertzian teeth cannot be fitted. They have the slope of linear ones of depth d at 1.5 d, so that
+/// each flank lies nearer by d / 2. Between both laws all are as likely.
 void allow_for_unknown_teeth(const OutputError& fit, Identification& result) {
   const double uniform = 1 / std::sqrt(3.0);  // standard deviation about the end of a range of 1
-  const auto widen = [&](rig_file::ParameterKind kind, double difference) {
-    const auto at = result.parameters.find(rig_file::servo_parameter(rig_file::RigPart::mesh, kind).name);
-    if (at == result.parameters.end()) return;
-    at->second.standard_error = std::hypot(at->second.standard_error, uniform * difference);
-  };
-  const double stiffness =
-      rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness).get(fit.rig);
-  widen(rig_file::ParameterKind::backlash, mesh_torque(fit) / stiffness);
-  widen(rig_file::ParameterKind::stiffness, stiffness / 3);
+  widen(result, rig_file::ParameterKind::backlash, uniform * mesh_torque(fit) / (3 * secant_of_slope(fit)));
+  widen(result, rig_file::ParameterKind::stiffness, uniform * secant_of_slope(fit));
   result.warnings.emplace_back(
       "whether the teeth are linear, as declared, or Hertzian is not distinguishable: the errors of play and "
       "stiffness allow for both");
@@ -193,6 +199,7 @@ void allow_for_other_teeth(const OutputError& fit, const OutputError& other, Ide
     signal::Measured& measured = result.parameters.at(name);
     measured.standard_error = std::hypot(measured.standard_error, value.value - measured.value);
   }
+  widen(result, rig_file::ParameterKind::stiffness, secant_of_slope(fit));
   std::string warning = fmt::format(
       "Hertzian teeth leave less than linear ones, {:.3g} times the noise instead of {:.3g}: the errors hold "
       "the values of both, trace_residual says which",
