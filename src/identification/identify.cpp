@@ -145,11 +145,17 @@ void withhold_unexplained(Identification& result) {
   if (result.several) return;
   for (const auto& [name, channel] : result.channels) {
     if (left_beyond_noise(channel) <= kMostLeft) continue;  // none of NaN is
-    const std::string reason = fmt::format(
-        "{}: the fitted machine leaves {} where noise alone would leave {}: it is no machine of the "
-        "rig file's kind, and no value is reported that this channel shows; trace_residual looks "
-        "for what the rig file lacks",
-        name, share_text(channel.error), share_text(channel.floor));
+    const std::string reason =
+        std::isfinite(channel.error)
+            ? fmt::format(
+                  "{}: the fitted machine leaves {} where noise alone would leave {}: it is no machine of "
+                  "the rig file's kind, and no value is reported that this channel shows; "
+                  "trace_residual looks for what the rig file lacks",
+                  name, share_text(channel.error), share_text(channel.floor))
+            : fmt::format(
+                  "{}: no sample of it counts, as the motor never slides one way for long: it chatters "
+                  "or rests; record a motion of moves that last, with a controller that does not swing",
+                  name);
     result.unexplained = result.unexplained ? *result.unexplained + ". " + reason : reason;
     for (auto& [parameter, measured] : result.parameters) {
       const bool shown = name == "torque" || result.one_inertia ||
