@@ -28,6 +28,8 @@ constexpr double kMostSeconds = 60;      // s, choice (time): of all records
 constexpr std::size_t kMostRecords = 3;  // choice (time)
 constexpr double kWorthwhileShare =
     0.3;  // choice: of the record that varies most, from which another is worth its time
+constexpr double kSecant =
+    1.0 / 3;  // theory: of the slope, by which force over penetration is less where it grows by the power 1.5
 constexpr double kFewestSeconds = 2;  // s, choice: of a record
 
 struct Stretch {
@@ -131,35 +133,21 @@ double most_left(const OutputError& fit) {
   return most;
 }
 
-/// N m, standard deviation.
-double motor_torque(const std::vector<ServoData>& data) {
-  double torque = 0;
+/// The machine with the same values and Hertzian teeth, fitted; nothing where they leave more.
+std::optional<OutputError> with_hertzian_fit(const OutputError& fit, const std::vector<ServoData>& data,
+                                             OutputErrorSettings settings) {
+  double torque = 0;  // N m, standard deviation
   for (const ServoData& d : data) torque = std::max(torque, spread(d.torque) / std::sqrt(double(d.size())));
-  return torque;
-}
-
-/// N m, standard deviation of what goes through the teeth.
-double mesh_torque(const OutputError& fit) {
-  double torque = 0;
-  for (const ServoPrediction& p : fit.predictions)
-    torque = std::max(torque, spread(p.load.mesh_torque) / std::sqrt(double(p.load.mesh_torque.size())));
-  return torque;
-}
-
-/// The machine with the same values and Hertzian teeth, fitted; nothing where the fit fails, and leaves more
-/// than what it began with.
-std::optional<OutputError> hertzian_fit(const model::Rig& teeth, const OutputError& fit,
-                                        const std::vector<ServoData>& data, OutputErrorSettings settings) {
+  const auto teeth = with_hertzian_teeth(fit.rig, torque);
+  if (!teeth) return std::nullopt;
   settings.findings.clear();
   settings.parameters.clear();
   for (const rig_file::RigParameter& p : rig_file::servo_parameters())
-    if (p.known_to(teeth) && (!p.contact.empty() || fit.parameters.count(p.name) > 0))
+    if (p.known_to(*teeth) && (!p.contact.empty() || fit.parameters.count(p.name) > 0))
       settings.parameters.push_back(p.name);
   try {
-    OutputError begin = fit, other = fit_output_error(teeth, data, settings);
-    for (std::size_t i = 0; i < data.size(); ++i)
-      begin.predictions[i] = predict_servo(teeth, data[i], settings.fit, fit.calibrations[i]);
-    if (most_left(other) <= most_left(begin)) return other;
+    OutputError other = fit_output_error(*teeth, data, settings);
+    if (most_left(other) < most_left(fit)) return other;
   } catch (const CannotIdentify&) {
   } catch (const InvalidParameter&) {  // values that no machine has
   } catch (const IntegrationError&) {  // or with which the load runs away
@@ -167,39 +155,17 @@ std::optional<OutputError> hertzian_fit(const model::Rig& teeth, const OutputErr
   return std::nullopt;
 }
 
-/// Of a value of the mesh, where another law of the teeth may hold.
-void widen(Identification& result, rig_file::ParameterKind kind, double difference) {
-  const auto at = result.parameters.find(rig_file::servo_parameter(rig_file::RigPart::mesh, kind).name);
-  if (at == result.parameters.end()) return;
-  at->second.standard_error = std::hypot(at->second.standard_error, difference);
-}
-
-/// Force over penetration, where the force grows with the power 1.5, is two thirds of the slope.
-double secant_of_slope(const OutputError& fit) {
-  const auto stiffness =
-      rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness);
-  return stiffness.get(fit.rig) / 3;
-}
-
-/// Where Hertzian teeth cannot be fitted. They have the slope of linear ones of depth d at 1.5 d, so that
-/// each flank lies nearer by d / 2. Between both laws all are as likely.
-void allow_for_unknown_teeth(const OutputError& fit, Identification& result) {
-  const double uniform = 1 / std::sqrt(3.0);  // standard deviation about the end of a range of 1
-  widen(result, rig_file::ParameterKind::backlash, uniform * mesh_torque(fit) / (3 * secant_of_slope(fit)));
-  widen(result, rig_file::ParameterKind::stiffness, uniform * secant_of_slope(fit));
-  result.warnings.emplace_back(
-      "whether the teeth are linear, as declared, or Hertzian is not distinguishable: the errors of play and "
-      "stiffness allow for both");
-}
-
 /// Where teeth of another law leave less, no value is known better than by the difference between the laws.
 void allow_for_other_teeth(const OutputError& fit, const OutputError& other, Identification& result) {
-  for (const auto& [name, value] : other.parameters) {
-    if (!rig_file::servo_parameter(name).contact.empty()) continue;
-    signal::Measured& measured = result.parameters.at(name);
-    measured.standard_error = std::hypot(measured.standard_error, value.value - measured.value);
+  for (auto& [name, measured] : result.parameters) {
+    const rig_file::RigParameter& parameter = rig_file::servo_parameter(name);
+    double difference = 0;
+    if (parameter.contact.empty() && other.parameters.count(name) > 0)
+      difference = other.parameters.at(name).value - measured.value;
+    else if (parameter.kind == rig_file::ParameterKind::stiffness)
+      difference = kSecant * measured.value;
+    measured.standard_error = std::hypot(measured.standard_error, difference);
   }
-  widen(result, rig_file::ParameterKind::stiffness, secant_of_slope(fit));
   std::string warning = fmt::format(
       "Hertzian teeth leave less than linear ones, {:.3g} times the noise instead of {:.3g}: the errors hold "
       "the values of both, trace_residual says which",
@@ -262,13 +228,8 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   if (lacks_something(d) || lacks_something(t)) {
     for (auto& [name, value] : c.result.parameters)
       allow_for_declared(rig_file::servo_parameter(name).get(c.declared), value);
-    if (const auto teeth = with_hertzian_teeth(fit.rig, motor_torque(data))) {
-      const auto other = hertzian_fit(*teeth, fit, data, settings);
-      if (!other)
-        allow_for_unknown_teeth(fit, c.result);
-      else if (most_left(*other) < most_left(fit))
-        allow_for_other_teeth(fit, *other, c.result);
-    }
+    if (const auto other = with_hertzian_fit(fit, data, settings))
+      allow_for_other_teeth(fit, *other, c.result);
     c.result.several = contradicting(c, data, report.records, most_left(c.result.channels), settings);
     if (c.result.several) allow_for_several(*c.result.several, c.result.parameters);
   }
