@@ -131,7 +131,8 @@ class ArmTest(unittest.TestCase):
         answer = set_rig(text)
         self.assertTrue(answer.success, answer.message)
         after = states.wait_for_count(len(states.messages) + 1)[-1].header.stamp
-        change = reports.wait_for(lambda all_of: all_of and all_of[0], "report").news[0]
+        # Seconds on an idle machine; a busy one leaves looks out.
+        change = reports.wait_for(lambda all_of: all_of and all_of[0], "report", 180).news[0]
         rospy.loginfo(change.text)
         self.assertEqual((change.joint, change.effect), ("elbow", "payload"))  # the joint that turns its link
         for name, value in (("mass", 0.8), ("centre_x", 0.25)):

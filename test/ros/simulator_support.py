@@ -36,9 +36,9 @@ class Inbox:
             self.messages.append(message)
             self._changed.notify_all()
 
-    def wait_for(self, condition, what):
-        """Returns condition(messages) as soon as it is true; fails after TIMEOUT, whatever ROS time does."""
-        deadline = time.monotonic() + TIMEOUT
+    def wait_for(self, condition, what, timeout=TIMEOUT):
+        """Returns condition(messages) as soon as it is true; fails after `timeout` [s], whatever ROS time does."""
+        deadline = time.monotonic() + timeout
         with self._changed:
             while True:
                 result = condition(self.messages)
@@ -47,7 +47,7 @@ class Inbox:
                 left = deadline - time.monotonic()
                 if left <= 0:
                     raise AssertionError("%s: no %s within %d s, %d messages came" % (
-                        self._subscriber.name, what, TIMEOUT, len(self.messages)))
+                        self._subscriber.name, what, timeout, len(self.messages)))
                 self._changed.wait(left)
 
     def wait_for_count(self, count):
