@@ -131,7 +131,7 @@ class ArmTest(unittest.TestCase):
         answer = set_rig(text)
         self.assertTrue(answer.success, answer.message)
         after = states.wait_for_count(len(states.messages) + 1)[-1].header.stamp
-        # Seconds on an idle machine; a busy one leaves looks out.
+        # Some 8 s on an idle machine; that a whole run of the checks once waited 60 s in vain is not explained.
         change = reports.wait_for(lambda all_of: all_of and all_of[0], "report", 180).news[0]
         rospy.loginfo(change.text)
         self.assertEqual((change.joint, change.effect), ("elbow", "payload"))  # the joint that turns its link
