@@ -133,9 +133,11 @@ double most_left(const OutputError& fit) {
   return most;
 }
 
-/// The machine with the same values and Hertzian teeth, fitted; nothing where they leave more.
+/// The machine with the same values and Hertzian teeth, fitted; nothing where they leave more, or where that
+/// fails, which is said.
 std::optional<OutputError> with_hertzian_fit(const OutputError& fit, const std::vector<ServoData>& data,
-                                             OutputErrorSettings settings) {
+                                             OutputErrorSettings settings,
+                                             std::vector<std::string>& warnings) {
   double torque = 0;  // N m, standard deviation
   for (const ServoData& d : data) torque = std::max(torque, spread(d.torque) / std::sqrt(double(d.size())));
   const auto teeth = with_hertzian_teeth(fit.rig, torque);
@@ -148,9 +150,12 @@ std::optional<OutputError> with_hertzian_fit(const OutputError& fit, const std::
   try {
     OutputError other = fit_output_error(*teeth, data, settings);
     if (most_left(other) < most_left(fit)) return other;
-  } catch (const CannotIdentify&) {
-  } catch (const InvalidParameter&) {  // values that no machine has
-  } catch (const IntegrationError&) {  // or with which the load runs away
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {  // values that no machine has, or with which the load runs away
+    warnings.push_back(
+        std::string("Hertzian teeth cannot be fitted, so that the errors are those of linear ones: ") +
+        error.what());
   }
   return std::nullopt;
 }
@@ -228,7 +233,7 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   if (lacks_something(d) || lacks_something(t)) {
     for (auto& [name, value] : c.result.parameters)
       allow_for_declared(rig_file::servo_parameter(name).get(c.declared), value);
-    if (const auto other = with_hertzian_fit(fit, data, settings))
+    if (const auto other = with_hertzian_fit(fit, data, settings, c.result.warnings))
       allow_for_other_teeth(fit, *other, c.result);
     c.result.several = contradicting(c, data, report.records, most_left(c.result.channels), settings);
     if (c.result.several) allow_for_several(*c.result.several, c.result.parameters);
