@@ -35,6 +35,10 @@ double load_elsewhere(const Moment& m, double s) {
 double whole_torque(const Moment& m, double) {
   return m.torque;
 }
+/// The recorded torque is that of s later, per s: Taylor's series.
+double torque_ahead(const Moment& m, double s) {
+  return m.torque_rates[0] + s / 2 * m.torque_rates[1] + s * s / 6 * m.torque_rates[2];
+}
 double mesh_load(const Moment& m, double) {
   return m.mesh;
 }
@@ -47,16 +51,26 @@ struct Declared {
   const char *name, *unit, *value;
   double (*column)(const Moment&, double shape);
   bool of_load = false;
+  bool of_size = false;
 };
 const Declared kOfTorque[] = {{"motor_coulomb", "N m", "motor_coulomb", direction},
                               {"motor_viscous", "N m s/rad", "motor_viscous", speed},
                               {"motor_inertia", "kg m^2", "motor_inertia", acceleration},
                               {"load_inertia", "kg m^2", "load_inertia", acceleration},
                               {"motor_torque_gain", "-", "gain", whole_torque, true},
-                              {kSlip, "rad", "offset", load_elsewhere, true}};
+                              {kSlip, "rad", "offset", load_elsewhere, true, true}};
 const Declared kOfDeflection[] = {{"mesh_stiffness", "rad/(N m)", "compliance", mesh_load},
                                   {kSlip, "rad", "offset", less_one},
                                   {"encoder_skew", "s", "encoder_skew", speed}};
+
+/// A delay of the torque calibrates a channel: its term has no column of its own.
+const Declared& delay_of_torque() {
+  static const model::TermType& type = model::term_type_that(
+      [](const model::TermType& t) { return t.calibrates == model::Calibrates::torque_delay; });
+  static const Declared delay = {type.id.c_str(), "s",  type.search->strength.c_str(),
+                                 torque_ahead,    true, true};
+  return delay;
+}
 
 ChangeEffect effect_of(const Declared& d) {
   ChangeEffect e{d.name};
@@ -64,7 +78,7 @@ ChangeEffect effect_of(const Declared& d) {
     return std::vector<OfMoment>{[=](const Moment& m) { return column(m, shape); }};
   };
   e.count = 1;
-  e.of_load = d.of_load;
+  e.of_load = d.of_load, e.of_size = d.of_size;
   return e;
 }
 
@@ -73,7 +87,7 @@ const Declared* declared(const std::string& id) {
     if (id == d.name) return &d;
   for (const Declared& d : kOfDeflection)
     if (id == d.name) return &d;
-  return nullptr;
+  return id == delay_of_torque().name ? &delay_of_torque() : nullptr;
 }
 
 model::JointMoment joint_moment(const Moment& m) {
@@ -152,10 +166,6 @@ ChangeEffect ramp_of(const ChangeEffect& effect, const ChangeEffect& called) {
 
 }  // namespace
 
-bool ChangeEffect::is_slip() const {
-  return law && id == kSlip;
-}
-
 bool ChangeEffect::has_scale() const {
   return type && shape > 0 && !has_order() && !of_load;
 }
@@ -170,7 +180,7 @@ Eigen::Index ChangeEffect::freedom() const {
 
 std::string ChangeEffect::name() const {
   if (at_place()) return id + " at " + to_text(shape);
-  return shape > 0 && !is_slip() ? id + " " + to_text(shape) + variant : id;
+  return shape > 0 && !of_size ? id + " " + to_text(shape) + variant : id;
 }
 
 std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
@@ -183,6 +193,7 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
     // What is carried or dropped moves with the load.
     add_declared(sampling.mesh ? "load_inertia" : "motor_inertia");
     if (!sampling.chain) add_declared("motor_torque_gain");
+    if (!sampling.chain) add_declared(delay_of_torque().name);
     if (!sampling.mesh && !sampling.chain) add_declared(kSlip);
   } else {
     for (const Declared& d : kOfDeflection) all.push_back(effect_of(d));

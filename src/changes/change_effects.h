@@ -26,6 +26,7 @@ struct ChangeEffect {
   double width = 0;                       // rad, of what is at a place; 0: it is not
   const model::TermType* type = nullptr;  // of the dictionary; null: no term's effect
   bool of_load = false;                   // its columns need what the healthy machine is taken to bear
+  bool of_size = false;                   // `shape` is the size that its columns are right for
   bool rubs = false;                      // a part of friction, the same in both directions
   std::string variant = "";               // which law of several of one term
 
@@ -33,8 +34,6 @@ struct ChangeEffect {
   bool at_place() const { return width > 0; }
   /// Values that are fitted, order, place and width among them.
   Eigen::Index freedom() const;
-  bool is_slip()
-      const;  // of a joint by itself: `shape` is the slip [rad] whose size the columns are right for
   bool has_order() const { return type && model::has_order(*type); }
   bool has_scale() const;      // `shape` is a speed or a way that is fitted by factors
   double least_order() const;  // that is tried, of one that has one

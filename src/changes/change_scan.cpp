@@ -2,7 +2,10 @@
 #include "change_scan.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+
+#include "healthy_columns.h"
 
 namespace backlash::changes {
 
@@ -19,6 +22,28 @@ void Background::solve() {
   estimate = inverse * (columns.transpose() * residual / variance);
 }
 
+namespace {
+
+/// (N m)^2, of unknown times of the samples.
+double timing_variance(const HealthyModel& model, const SampledMotion& motion) {
+  if (motion.unsure_time == 0 || motion.sampling.channel != ChangeChannel::torque) return 0;
+  double squares = 0;
+  for (Eigen::Index r = 0; r < motion.size(); ++r) squares += std::pow(motion.moment(r).speed, 2);
+  const double place = squares / double(motion.size()) * std::pow(motion.unsure_time, 2);
+  const double dt = motion.sampling.interval / double(motion.sampling.thinned);
+  return std::pow(model.values[kInertia], 2) * place * 2 * dt * std::pow(2 * M_PI, 4) *
+         std::pow(motion.sampling.cutoff, 5) / 5;
+}
+
+}  // namespace
+
+double noise_variance(const HealthyModel& model, const SampledMotion& motion) {
+  double healthy = 0;
+  for (const SampledMotion& record : *model.records)
+    healthy += timing_variance(model, record) / double(model.records->size());
+  return model.noise * model.noise + std::max(0.0, timing_variance(model, motion) - healthy);
+}
+
 Background background_of(const HealthyModel& model, const SampledMotion& motion,
                          const ChangeSettings& settings) {
   Whitened whitened = residual_of(model, motion, settings);
@@ -26,7 +51,7 @@ Background background_of(const HealthyModel& model, const SampledMotion& motion,
   b.residual = std::move(whitened.residual);
   b.columns = std::move(whitened.nuisances);
   b.spread = std::move(whitened.spread);
-  b.variance = model.noise * model.noise;
+  b.variance = noise_variance(model, motion);
   b.solve();
   return b;
 }

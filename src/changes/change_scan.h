@@ -29,6 +29,12 @@ struct Background {
   }
 };
 
+/// Of a row of a record: that of the healthy machine, and of a torque what is unknown of when samples were
+/// taken, beyond what was of the healthy records. A sample that is late by e is off by e times the speed;
+/// white noise of positions has, twice differentiated up to the cutoff f of samples dt apart,
+/// 2 dt (2 pi)^4 f^5 / 5 times its variance.
+double noise_variance(const HealthyModel& model, const SampledMotion& motion);
+
 /// Of a record by its healthy machine.
 Background background_of(const HealthyModel& model, const SampledMotion& motion,
                          const ChangeSettings& settings);

@@ -60,7 +60,7 @@ Background ChangeSearch::background(const std::vector<FoundChange>& others) cons
     b.spread.conservativeResize(p + z.cols());
     b.spread.tail(z.cols()).setConstant(std::numeric_limits<double>::infinity());
   }
-  b.variance = model_.noise * model_.noise;
+  b.variance = noise_variance(model_, motion_);
   b.solve();
   return b;
 }
@@ -115,7 +115,7 @@ FoundChange ChangeSearch::scanned(const ChangeEffect& e, const Background& b, st
     best.from = k;
     best.score = std::move(s);
   }
-  refine_slip(best, b);
+  refine_size(best, b);
   return best;
 }
 
@@ -239,7 +239,7 @@ EffectSums ChangeSearch::sums_of(const FoundChange& f, const Background& b) cons
 void ChangeSearch::refine(FoundChange& f, const Background& b) const {
   if (f.effect.at_place()) refine_fault(f, b);
   if (f.effect.has_scale()) refine_scale(f, b);
-  refine_slip(f, b);
+  refine_size(f, b);
   refine_order(f, b);
   refine_onset(f, sums_of(f, b), b);
   f.gain = f.score.gain / f.inflation;

@@ -77,7 +77,7 @@ class ChangeSearch {
   bool take_better(FoundChange& f, const ChangeEffect& e, double times, const Background& b) const;
   void refine(FoundChange& f, const Background& b) const;
   void refine_order(FoundChange& f, const Background& b) const;
-  void refine_slip(FoundChange& f, const Background& b) const;
+  void refine_size(FoundChange& f, const Background& b) const;
   void refine_scale(FoundChange& f, const Background& b) const;
   void add_inertia(FoundChange& f, const Background& b) const;
   // Faults at a place

@@ -69,9 +69,9 @@ void ChangeSearch::refine_scale(FoundChange& f, const Background& b) const {
       }
 }
 
-/// Columns for a slip of that size: gravity is no straight line.
-void ChangeSearch::refine_slip(FoundChange& f, const Background& b) const {
-  if (!f.effect.is_slip() || motion_.sampling.channel != ChangeChannel::torque) return;
+/// Columns for a slip or a delay of that size: gravity, or torque over time, is no straight line.
+void ChangeSearch::refine_size(FoundChange& f, const Background& b) const {
+  if (!f.effect.of_size) return;
   for (int round = 0; round < kRounds && f.score.values.size() > 0; ++round) {
     ChangeEffect e = f.effect;
     e.shape = f.score.values[0];

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
 #include "change_scan.h"
 #include "healthy_columns.h"
 
@@ -82,10 +83,16 @@ void set_torques(const HealthyModel& model, SampledMotion& motion) {
   for (OfMoment& f : warming(motion.sampling, model.warm_up)) all.push_back(std::move(f));
   for (const ChangeEffect& e : model.further)
     for (OfMoment& f : e.columns()) all.push_back(std::move(f));
+  std::vector<double> torques;
   for (Moment& m : motion.moments) {
     m.torque = m.chain;
     for (std::size_t i = 0; i < all.size(); ++i)
       m.torque += model.values[static_cast<Eigen::Index>(i)] * all[i](m);
+    torques.push_back(m.torque);
+  }
+  for (std::size_t order = 0; order < motion.moments.front().torque_rates.size(); ++order) {
+    torques = signal::derivative(torques, motion.sampling.interval);
+    for (std::size_t k = 0; k < torques.size(); ++k) motion.moments[k].torque_rates[order] = torques[k];
   }
 }
 

@@ -163,7 +163,8 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
                 0,
                 0,
                 even.chain[k],
-                0};
+                0,
+                {}};
     if (const auto& mesh = sampling.mesh)
       m.mesh = mesh->inertia * (acceleration[k] - parting[k]) + mesh->viscous * m.speed +
                mesh->coulomb * m.direction + mesh->cosine * std::cos(m.position) +
@@ -203,6 +204,7 @@ SampledMotion sampled_motion(const record::Record& record, const MotionSampling&
   SampledMotion motion;
   motion.sampling = sampling;
   motion.start = record.time.front();
+  if (record.unsure_time > 0) motion.unsure_time = record.unsure_time;
   add_moments(even, settings, motion);
   const auto guard = static_cast<std::size_t>(std::ceil(settings.guard / sampling.cutoff / dt));
   const std::vector<char> good = usable(motion, even.there, guard, settings);

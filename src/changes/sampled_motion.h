@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
@@ -55,6 +56,7 @@ struct Moment {
   double mesh;          // N m, that the teeth bear; 0: one inertia
   double chain;         // N m, that the rest of an arm takes; 0: there is none
   double torque;        // N m, that the healthy machine takes in all; 0: not known yet
+  std::array<double, 3> torque_rates;  // N m/s, N m/s^2, N m/s^3, derivatives of that
 
   double side() const { return mesh < 0 ? -1 : 1; }  // flank that bears it
 };
@@ -68,6 +70,7 @@ struct SampledMotion {
   std::vector<std::size_t> rows;  // that count, few enough for the cutoff
   Eigen::VectorXd target;         // N m or rad, of the channel, filtered, of the rows
   double row_interval = 0;        // s
+  double unsure_time = 0;         // s, standard deviation of when each sample was taken
   mutable std::map<std::string, std::shared_ptr<const Eigen::MatrixXd>>
       known_columns;  // of effect_columns(), so far as there is room
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
+#include <utility>
 
 #include "sample_grid.h"
 
@@ -28,6 +28,27 @@ namespace {
 
 constexpr double kFarStep = 1e6;  // intervals, of one step: no record of such a gap is one
 
+/// Samples that follow one another, up to a gap in which the phase of their clock is forgotten.
+struct ClockRun {
+  std::size_t from, to;
+};
+
+std::vector<ClockRun> clock_runs(const std::vector<std::size_t>& row) {
+  std::vector<ClockRun> runs = {{0, row.size()}};
+  for (std::size_t i = 1; i < row.size(); ++i)
+    if (row[i] - row[i - 1] > kForgotten) runs.back().to = i, runs.push_back({i, row.size()});
+  return runs;
+}
+
+/// Row and time.
+std::pair<double, double> middle_of(const ClockRun& run, const std::vector<std::size_t>& row,
+                                    const std::vector<double>& time) {
+  double rows = 0, times = 0;
+  for (std::size_t i = run.from; i < run.to; ++i) rows += double(row[i]), times += time[i] - time[run.from];
+  const double n = double(run.to - run.from);
+  return {rows / n, time[run.from] + times / n};
+}
+
 }  // namespace
 
 std::optional<SampleGrid> grid_of(const std::vector<double>& time, double median) {
@@ -37,16 +58,28 @@ std::optional<SampleGrid> grid_of(const std::vector<double>& time, double median
   g.row = rows_of_samples(time, median);
   const std::size_t rows = g.row.back() + 1;
   if (rows > 2 * time.size()) return {};
-  const double n = double(time.size()), middle = std::accumulate(g.row.begin(), g.row.end(), 0.0) / n;
-  double mean = 0, along = 0, square = 0;
-  for (const double t : time) mean += (t - time[0]) / n;
-  for (std::size_t i = 0; i < time.size(); ++i) {
-    along += (double(g.row[i]) - middle) * (time[i] - time[0] - mean);
-    square += std::pow(double(g.row[i]) - middle, 2);
+  const std::vector<ClockRun> runs = clock_runs(g.row);
+  double along = 0, square = 0;
+  for (const ClockRun& run : runs) {
+    const auto [row, mean] = middle_of(run, g.row, time);
+    for (std::size_t i = run.from; i < run.to; ++i) {
+      along += (double(g.row[i]) - row) * (time[i] - mean);
+      square += std::pow(double(g.row[i]) - row, 2);
+    }
   }
-  const double interval = along / square;
-  for (std::size_t k = 0; k < rows; ++k)
-    g.time.push_back(time[0] + (mean + (static_cast<double>(k) - middle) * interval));
+  const double interval = square > 0 ? along / square : median;
+  for (const ClockRun& run : runs) {
+    const auto [row, mean] = middle_of(run, g.row, time);
+    const auto on_line = [&, row = row, mean = mean](std::size_t k) {
+      return mean + (double(k) - row) * interval;
+    };
+    const std::size_t first = g.row[run.from], gap = g.time.size();
+    for (std::size_t k = gap; k < first; ++k) {
+      const double last = g.time[gap - 1], share = double(k + 1 - gap) / double(first + 1 - gap);
+      g.time.push_back(last + share * (on_line(first) - last));
+    }
+    for (std::size_t k = first; k <= g.row[run.to - 1]; ++k) g.time.push_back(on_line(k));
+  }
   g.lost.assign(rows, true);
   for (std::size_t i = 0; i < time.size(); ++i) {
     g.lost[g.row[i]] = false;

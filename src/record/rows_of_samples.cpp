@@ -8,6 +8,7 @@
 
 #include "backlash_diagnosis/record/even_grid.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
+#include "sample_grid.h"
 
 namespace backlash::record {
 namespace {
@@ -36,9 +37,14 @@ struct Count {
 /// The way `from`, with its next sample at `time` [median intervals] so many rows on.
 Count extended(const Count& from, std::size_t which, double time, std::size_t rows, double jitter) {
   const double off = time - (from.expected + double(rows - 1) * from.interval);
-  const double followed = std::clamp(off, -kMostFollowed, kMostFollowed);
   Count to;
   to.row = from.row + rows, to.before = which;
+  if (rows > kForgotten) {
+    to.cost = from.cost + kLossCost + off * off;
+    to.interval = from.interval, to.expected = time + to.interval;
+    return to;
+  }
+  const double followed = std::clamp(off, -kMostFollowed, kMostFollowed);
   to.cost = from.cost + std::min(kOutlier, std::pow(off / jitter, 2)) + (rows > 1 ? kLossCost : 0);
   const bool near = followed == off;  // what is further off says nothing of the rate
   to.interval = std::max(kShortest, from.interval + (near ? kFollowRate * off : 0));

@@ -12,6 +12,8 @@ namespace backlash::record {
 constexpr double kEven =
     1e-3;  // of an interval, off which a stamp moves no sample: choice, far below any jitter
 constexpr std::size_t kOfCubic = 4;  // theory: samples of a cubic
+// Rows of a gap, behind which the clock has any phase. Theory: as many as a clock is followed within.
+constexpr std::size_t kForgotten = 10;
 
 struct SampleGrid {
   std::vector<double> time;      // s, of the rows
@@ -21,7 +23,8 @@ struct SampleGrid {
 };
 
 /// Samples count on from one another: a clock that drifts against the median interval does not add up. The
-/// rows are a line through the stamps. Nothing where more than half of the rows would be lost.
+/// rows are a line through the stamps, of one slope, that begins anew behind a gap in which its phase was
+/// forgotten. Nothing where more than half of the rows would be lost.
 std::optional<SampleGrid> grid_of(const std::vector<double>& time, double median);
 
 /// Samples taken at `time`, at the rows of the grid.

@@ -73,10 +73,10 @@ std::vector<double> centre_of(const std::vector<double>& motor, const std::vecto
 /// times t. What is off at any rate is noise: a regression of the squares on those of the rate separates
 /// both.
 SamplingTimes by_motion(const Record& record, const SampleGrid& g, SamplingTimes times) {
-  if (!record.has(Channel::motor_position) || !record.has(Channel::load_position)) return times;
-  const std::vector<double> centre =
-      centre_of(at_rows(g, times.time, record.column(Channel::motor_position), true),
-                at_rows(g, times.time, record.column(Channel::load_position), true));
+  if (!record.has(Channel::motor_position)) return times;
+  const auto rows = [&](Channel channel) { return at_rows(g, times.time, record.column(channel), true); };
+  std::vector<double> centre = rows(Channel::motor_position);
+  if (record.has(Channel::load_position)) centre = centre_of(centre, rows(Channel::load_position));
   const signal::LocalParabola parabola(kReach);
   const double interval = g.time[1] - g.time[0], slow = parabola.value[kReach];
   std::vector<double> off(centre.size(), 0.0), rate(centre.size(), 0.0);

@@ -98,8 +98,7 @@ changes::Changes changes_of_joint(changes::ChangeInputs& inputs, const changes::
   std::vector<std::string> warnings;
   std::vector<record::Record> healthy;
   for (const std::string& file : inputs.healthy)
-    for (record::Record& stretch : door.admit_stretches(read(file, rig), declared, file))
-      healthy.push_back(std::move(stretch));
+    healthy.push_back(door.admit_healthy(read(file, rig), declared, file));
   std::vector<RecordDoor::JointJump> jumps;
   const record::Record record =
       door.admit_with_jumps(read(inputs.record, rig), declared, inputs.record, jumps);

@@ -143,6 +143,23 @@ const Case kCases[] = {
 INSTANTIATE_TEST_SUITE_P(Effects, ChangesOf, testing::ValuesIn(kCases),
                          [](const auto& info) { return info.param.effect; });
 
+// From 120 s on the torque is stamped two samples before it acts.
+TEST(Changes, ATorqueThatActsLaterIsADelay) {
+  constexpr std::size_t kLater = 2;
+  record::Record late = made(30, 200, nothing);
+  std::vector<double>& torque = late.column(record::Channel::motor_torque);
+  for (auto k = std::size_t(kOnset * kRate); k + kLater < torque.size(); ++k) torque[k] = torque[k + kLater];
+  const Changes found = changes_of(late);
+  ASSERT_EQ(found.changes.size(), 1u);
+  const Change& c = found.changes.front();
+  EXPECT_EQ(c.effect, "delay");
+  EXPECT_LE(c.since_from, 120);
+  EXPECT_GE(c.since_to, 120);
+  ASSERT_EQ(c.size.size(), 1u);
+  EXPECT_NEAR(c.size[0].measured.value, kLater / kRate, 3 * c.size[0].measured.standard_error);
+  EXPECT_LT(c.size[0].measured.standard_error, 0.1 * kLater / kRate);
+}
+
 TEST(Changes, APayloadIsGravityWithInertia) {
   // At 0.5 m from the axis: m g l = 1.6 N m, m l^2 = 0.08 kg m^2
   const Changes found = changes_of(

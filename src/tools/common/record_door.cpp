@@ -67,11 +67,23 @@ void drop_rows_without_numbers(std::vector<record::JointRecord>& joints) {
   for (record::JointRecord& joint : joints) record::keep_rows_with_numbers({&joint.record});
 }
 
-/// Jumps are what is looked for, and a step of the clock is a rest; a channel that stands still would be a
-/// change of anything.
-void refuse_frozen(const report::CheckedFile& file) {
+/// Where a channel stands still nothing is known; a step of the clock is a rest.
+void leave_out_frozen(const report::CheckedFile& file, const std::vector<record::Record*>& records) {
+  for (const record::Finding& finding : file.findings()) {
+    if (finding.kind != record::FindingKind::frozen) continue;
+    for (record::Record* record : records) {
+      std::vector<bool> rows;
+      for (const double t : record->time) rows.push_back(t < finding.from || t > finding.to);
+      record::keep_rows(*record, rows);
+    }
+  }
+}
+
+/// A channel that does not go on again has failed.
+void refuse_failed(const report::CheckedFile& file, double end) {
   for (const record::Finding& finding : file.findings())
-    if (finding.kind == record::FindingKind::frozen) throw CannotIdentify(file.path + ": " + finding.message);
+    if (finding.kind == record::FindingKind::frozen && finding.to >= end)
+      throw CannotIdentify(file.path + ": " + finding.message);
 }
 
 /// Whether all joints, of several, jump with this one: a recording that goes on elsewhere, as no encoder is
@@ -139,10 +151,18 @@ std::vector<record::Record> RecordDoor::admit_stretches(record::Record record,
   return parts;
 }
 
+record::Record RecordDoor::admit_healthy(record::Record record, const record::DeclaredMotion& declared,
+                                         const std::string& path) {
+  record::CheckedRecord checked = look(std::move(record), declared, path);
+  leave_out_frozen(files_.back(), {&checked.record});
+  return record::without_jumps(std::move(checked.record), checked.check.jumps);
+}
+
 record::Record RecordDoor::admit_with_jumps(record::Record record, const record::DeclaredMotion& declared,
                                             const std::string& path, std::vector<JointJump>& jumps) {
   record::CheckedRecord checked = look(std::move(record), declared, path);
-  refuse_frozen(files_.back());
+  refuse_failed(files_.back(), checked.record.time.back());
+  leave_out_frozen(files_.back(), {&checked.record});
   for (const record::Jump& jump : checked.check.jumps) jumps.push_back({"", jump});
   return record::without_jumps(std::move(checked.record), checked.check.jumps);
 }
@@ -171,7 +191,10 @@ std::vector<record::JointRecord> RecordDoor::admit_with_jumps(std::vector<record
                                                               const std::string& path,
                                                               std::vector<JointJump>& jumps) {
   joints = look(std::move(joints), path);
-  refuse_frozen(files_.back());
+  refuse_failed(files_.back(), joints.front().record.time.back());
+  std::vector<record::Record*> records;
+  for (record::JointRecord& joint : joints) records.push_back(&joint.record);
+  leave_out_frozen(files_.back(), records);
   for (std::size_t j = 0; j < joints.size(); ++j) {
     std::vector<record::Jump> found = files_.back().joints[j].check.jumps;
     found.erase(std::remove_if(found.begin(), found.end(),

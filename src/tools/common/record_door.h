@@ -29,10 +29,14 @@ class RecordDoor {
     std::string joint;  // empty where the file has one
     record::Jump jump;
   };
-  /// A record with its jumps taken out, for whoever looks for them; throws as admit, and CannotIdentify where
-  /// a channel stands still.
+  /// A record with its jumps taken out, for whoever looks for them, without the rows in which a channel
+  /// stands still; throws as admit, and CannotIdentify where one stands still to the end.
   record::Record admit_with_jumps(record::Record record, const record::DeclaredMotion& declared,
                                   const std::string& path, std::vector<JointJump>& jumps);
+
+  /// Of a healthy machine: the same, where it stands still to the end what is before, and jumps are not news.
+  record::Record admit_healthy(record::Record record, const record::DeclaredMotion& declared,
+                               const std::string& path);
 
   /// The joints of one file: the longest stretch in which none is cut.
   std::vector<record::JointRecord> admit(std::vector<record::JointRecord> joints, const std::string& path);
