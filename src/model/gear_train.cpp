@@ -83,6 +83,7 @@ GearTrain::GearTrain(const Rig& rig)
     shape_follows_torque_ |= term->shape_follows_torque();
     dry |= term->has_dry_friction();
     friction_of_load_ |= one_body() && term->follows_mesh_torque();
+    share_of_load_ *= 1 - term->rotor_share();
     term->add_friction({}, at_rest);
     const bool acts_on_flanks = term->shapes_flanks() || term->loads_flanks();
     if (term->shapes_flanks()) flank_terms_.push_back(term.get());

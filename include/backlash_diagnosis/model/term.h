@@ -109,6 +109,8 @@ class Term {
 
   /// Whether it reads Motion::mesh_torque. A term must not read the motor's torque, which the model predicts.
   virtual bool follows_mesh_torque() const { return false; }
+  /// Share of the inertia of one body, 0 to 1, that turns before the teeth and does not load them.
+  virtual double rotor_share() const { return 0; }
 
   virtual void sense(Sensing&) const {}
 
@@ -147,8 +149,10 @@ struct TermShape {
   bool refined;  // the best value is then fitted with all other parameters; else it stays one of the values
   // Of an order, which may be any number > 0: orders that a spectrum of the residual shows are tried too.
   std::optional<WaveOver> wave = std::nullopt;
-  // It stays 0 until the effect is found; then it is fitted too, from these values (> 0) as starts.
-  bool later = false;
+  // > 0: it stays 0 until the effect is found; then it is fitted too, from these values (> 0) as starts,
+  // together with those of the same number, one number after the other.
+  int later = 0;
+  bool of_one_body = false;  // nothing where the load is behind teeth
 };
 
 /// 1/rad: orders that differ by less are hard to distinguish over the travel; infinite where nothing moves.
@@ -201,8 +205,9 @@ struct TermType {
   // missing only if the record shows it.
   bool shapes_friction = false;
   // Of effects that every machine has to some extent: a strength up to these fractions of the motor's dry
-  // friction and of the backlash angle is put into the model, but not reported as missing.
-  double usual_of_friction = 0, usual_of_gap = 0;
+  // friction, of the backlash angle, and as one wave per turn of a declared weight, is put into the model,
+  // but not reported as missing.
+  double usual_of_friction = 0, usual_of_gap = 0, usual_of_weight = 0;
   // Together with the declared contact law it can do what another contact law would do alone.
   bool stands_in_for_contact_law = false;
 };

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <optional>
 
-#include "backlash_diagnosis/simulation/driven_load.h"
 #include "effect_roles.h"
 #include "found_effects.h"
 #include "steps.h"
@@ -95,8 +94,7 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
                                                                 const SearchContext& context) {
   const BeliefSettings& settings = context.settings.belief;
   const auto belongs_to_machine = [&](std::size_t i) {
-    return simulation::load_moves_freely(h.declared->rig) &&
-           is_usual(h.effects[i].candidate, h.declared->rig);
+    return is_usual(h.effects[i].candidate, h.declared->rig);
   };
   const auto all = strengths(h, context);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
@@ -125,7 +123,7 @@ bool last_is_vague(const Hypothesis& h, const SearchContext& context) {
 std::string contradicted_by_unseen(const Hypothesis& h, const SearchContext& context) {
   const FitSettings& fit = context.settings.fit;
   const Effect& last = h.effects.back();
-  if (simulation::load_moves_freely(h.declared->rig) && is_usual(last.candidate, h.declared->rig)) return "";
+  if (is_usual(last.candidate, h.declared->rig)) return "";
   const Machine& before = h.effects.size() > 1 ? *h.effects.end()[-2].after : h.base->fit.machine;
   return contradicted(predicted(before, context.unseen, fit), predicted(*last.after, context.unseen, fit),
                       last.gain.deflection, is_learned(last.candidate.id), context.settings.belief);

@@ -59,7 +59,6 @@ void note_shape_of_friction(const Hypothesis& h, double least, Trace& trace) {
 
 /// What every machine has some of is in the model, and called missing only where it is more than usual.
 void note_usual_effects(const Hypothesis& h, Trace& trace) {
-  if (!simulation::load_moves_freely(h.declared->rig)) return;
   for (const Effect& effect : h.effects) {
     const auto at = std::find_if(trace.steps.begin(), trace.steps.end(),
                                  [&](const FoundEffect& e) { return e.id == effect.candidate.id; });

@@ -13,8 +13,7 @@ Hypothesis fit_declared(const model::Rig& declared, const SearchContext& context
 /// The parameters that the rig declares and such records identify.
 std::vector<FitParameter> declared_parameters(const model::Rig& rig);
 
-/// Of a term that every machine has some of, the largest strength that is usual (model/term.h); 0: none is.
-double usual_strength(const model::TermType& type, const model::Rig& rig);
+/// Whether every machine has as much of it (model/term.h).
 bool is_usual(const Candidate& candidate, const model::Rig& rig);
 
 /// One more named effect, that which two encoders show plainly to explain most; none of a machine with one.

@@ -1,21 +1,39 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What every machine has some of, and no rig file states: how friction builds up after a reversal, a torque
-// whose zero is not quite zero.
+// whose zero is not quite zero, or whose constant is not quite the declared one, which shows as more or less
+// weight.
 #include <cmath>
 
+#include "backlash_diagnosis/model/weight_term.h"
 #include "steps.h"
 
 namespace backlash::identification {
+namespace {
 
-double usual_strength(const model::TermType& type, const model::Rig& rig) {
-  return type.usual_of_friction * rig.motor.coulomb_friction +
-         type.usual_of_gap * rig.mesh.backlash / rig.mesh.lever();
+double declared_weight(const model::Rig& rig) {
+  double weight = 0;
+  for (const auto& term : rig.terms)
+    if (term->id == model::weight_term())
+      weight += std::fabs(term->values.at(model::term_type(term->id).search->strength));
+  return weight;
 }
+
+/// Or none per turn at all.
+bool is_one_wave_per_turn(const Candidate& candidate) {
+  for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
+    if (shape.wave && candidate.terms.front().at(shape.name) != 1) return false;
+  return true;
+}
+
+}  // namespace
 
 bool is_usual(const Candidate& candidate, const model::Rig& rig) {
   const model::TermType& type = model::term_type(candidate.id);
-  return type.search && candidate.terms.size() == 1 &&
-         std::fabs(candidate.terms.front().at(type.search->strength)) <= usual_strength(type, rig);
+  if (!type.search || candidate.terms.size() != 1) return false;
+  const double usual = type.usual_of_friction * rig.motor.coulomb_friction +
+                       type.usual_of_gap * rig.mesh.backlash / rig.mesh.lever() +
+                       (is_one_wave_per_turn(candidate) ? type.usual_of_weight * declared_weight(rig) : 0);
+  return std::fabs(candidate.terms.front().at(type.search->strength)) <= usual;
 }
 
 }  // namespace backlash::identification

@@ -31,14 +31,16 @@ WaveMoment over_motor_position(const Motion& m, const ParameterValues&) {
 }  // namespace
 
 TermType cogging_term() {
-  return {"cogging",
-          {{"amplitude", "N m", Range::any(), "A, at the load side"},
-           {"order", "1/rad", Range::positive(), "n, periods per turn of the motor position"},
-           {"phase", "rad", Range::any(), "p"}},
-          [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            return std::make_unique<Cogging>(p.at("amplitude"), p.at("order"), p.at("phase"));
-          },
-          TermSearch{"amplitude", "phase", clear_torque, {order_shape({false, over_motor_position})}}};
+  TermType type{"cogging",
+                {{"amplitude", "N m", Range::any(), "A, at the load side"},
+                 {"order", "1/rad", Range::positive(), "n, periods per turn of the motor position"},
+                 {"phase", "rad", Range::any(), "p"}},
+                [](const ParameterValues& p) -> std::unique_ptr<Term> {
+                  return std::make_unique<Cogging>(p.at("amplitude"), p.at("order"), p.at("phase"));
+                },
+                TermSearch{"amplitude", "phase", clear_torque, {order_shape({false, over_motor_position})}}};
+  type.usual_of_weight = kUsualOfWeight;
+  return type;
 }
 
 }  // namespace backlash::model

@@ -30,12 +30,14 @@ const std::string& weight_term() {
 }
 
 TermType gravity_term() {
-  return {weight_term(),
-          {{"amplitude", "N m", Range::not_negative(), "A"}, {"phase", "rad", Range::any(), "p"}},
-          [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            return std::make_unique<Gravity>(p.at("amplitude"), p.at("phase"));
-          },
-          TermSearch{"amplitude", "phase", clear_torque, {}}};
+  TermType type{weight_term(),
+                {{"amplitude", "N m", Range::not_negative(), "A"}, {"phase", "rad", Range::any(), "p"}},
+                [](const ParameterValues& p) -> std::unique_ptr<Term> {
+                  return std::make_unique<Gravity>(p.at("amplitude"), p.at("phase"));
+                },
+                TermSearch{"amplitude", "phase", clear_torque, {}}};
+  type.usual_of_weight = kUsualOfWeight;
+  return type;
 }
 
 }  // namespace backlash::model

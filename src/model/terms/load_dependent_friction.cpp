@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Dry friction in proportion to the torque that the teeth carry (loss of the gear under load):
 //   added friction = mu |T|        mu [-], T torque through the mesh [N m]
-// Of one inertia (mesh: rigid) T is what the load takes, J a less the torques of its terms (GearTrain).
-// Hamon, Gautier and Garrec (2010, IROS), "Dynamic identification of robots with a dry friction model
-// depending on load and velocity". A loss is never negative, and below 1 something arrives at the load.
+// Of one inertia (mesh: rigid) T is what the load takes, (1 - r) J a less the torques of its terms
+// (GearTrain), with r the share of J that is the motor's rotor, which loads no teeth. Hamon, Gautier and
+// Garrec (2010, IROS), "Dynamic identification of robots with a dry friction model depending on load and
+// velocity". A loss is never negative, and below 1 something arrives at the load.
 //
 // What the load takes may fluctuate faster than a record shows (teeth, rollers, stick and slip in the
 // bearings), more and more from a speed on: of T + n with n even within +-a,
@@ -26,8 +27,10 @@ class LoadDependentFriction : public EndFrictionTerm {
       : EndFrictionTerm(p),
         coefficient_(p.at("coefficient")),
         fluctuation_(p.at("fluctuation")),
-        speed_(p.at("fluctuation_speed")) {}
+        speed_(p.at("fluctuation_speed")),
+        rotor_share_(p.at("rotor_share")) {}
   bool follows_mesh_torque() const override { return true; }
+  double rotor_share() const override { return rotor_share_; }
   void add_friction(const Motion& motion, EndFriction& friction) const override {
     const double t = std::fabs(motion.mesh_torque);
     const double a = fluctuation_ * std::max(0.0, std::fabs(end_.velocity(motion)) - speed_);
@@ -35,7 +38,7 @@ class LoadDependentFriction : public EndFrictionTerm {
   }
 
  private:
-  double coefficient_, fluctuation_, speed_;
+  double coefficient_, fluctuation_, speed_, rotor_share_;
 };
 
 std::vector<double> fluctuations(const MotionRange& range) {
@@ -44,6 +47,10 @@ std::vector<double> fluctuations(const MotionRange& range) {
 
 std::vector<double> fluctuation_speeds(const MotionRange& range) {
   return {0.3 * range.speed, range.speed};
+}
+
+std::vector<double> rotor_shares(const MotionRange&) {
+  return {0.5};
 }
 
 double clear_coefficient(const MotionRange&) {
@@ -57,15 +64,17 @@ TermType load_dependent_friction_term() {
           {body_parameter(),
            {"coefficient", "-", Range::between(0, 0.95), "mu, friction per torque through the mesh"},
            {"fluctuation", "N m s/rad", Range::not_negative(), "k, of the torque, per speed", false, {}, 0},
-           {"fluctuation_speed", "rad/s", Range::not_negative(), "w0, where it begins", false, {}, 0}},
+           {"fluctuation_speed", "rad/s", Range::not_negative(), "w0, where it begins", false, {}, 0},
+           {"rotor_share", "-", Range::between(0, 1), "r, of one inertia before the teeth", false, {}, 0}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<LoadDependentFriction>(p);
           },
           TermSearch{"coefficient",
                      "",
                      clear_coefficient,
-                     {{"fluctuation", fluctuations, true, std::nullopt, true},
-                      {"fluctuation_speed", fluctuation_speeds, true, std::nullopt, true}}}};
+                     {{"rotor_share", rotor_shares, true, std::nullopt, 1, true},
+                      {"fluctuation", fluctuations, true, std::nullopt, 2},
+                      {"fluctuation_speed", fluctuation_speeds, true, std::nullopt, 2}}}};
 }
 
 }  // namespace backlash::model

@@ -10,6 +10,9 @@
 
 namespace backlash::model {
 
+/// Of a declared weight: a torque constant is not known better, and shows as more or less weight. Choice.
+constexpr double kUsualOfWeight = 0.05;
+
 /// Large compared with a torque noise of 1 %, small compared with the torque that moves the machine.
 inline double clear_torque(const MotionRange& range) {
   return 0.05 * range.torque;
