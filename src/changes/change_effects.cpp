@@ -16,6 +16,7 @@ constexpr double kLeastFrictionOrder = 1;            // 1/rad, of position-depen
 constexpr double kMostOrder = 80, kOrderStep = 0.5;  // 1/rad. Choice
 constexpr double kMostFrictionOrder = 12;            // 1/rad. Choice
 constexpr double kFluctuationSpeeds[] = {0.4, 0.7, 1, 1.4, 1.8, 2.3};  // - of the rms speed. Choice
+constexpr double kRotorShare = 0.1, kMostRotorShare = 1;  // of one inertia: steps that are tried. Choice
 const char* const kSlip = "encoder_slip";
 
 double direction(const Moment& m, double) {
@@ -149,6 +150,24 @@ std::optional<ChangeEffect> fluctuating(const ChangeEffect& effect, double w0) {
   return e;
 }
 
+/// Friction of the load of one inertia of which this share is the motor's rotor.
+ChangeEffect with_rotor(const ChangeEffect& effect, double share) {
+  ChangeEffect e = effect;
+  e.rotor_share = share;
+  e.variant += " rotor " + to_text(share);
+  e.law = [law = effect.law, share](double shape) {
+    std::vector<OfMoment> all = law(shape);
+    for (OfMoment& f : all)
+      f = [share, of_load = f](const Moment& m) {
+        Moment less = m;
+        less.load -= share * (m.load - m.weight);
+        return of_load(less);
+      };
+    return all;
+  };
+  return e;
+}
+
 /// What grows linearly from the onset on, as another effect is called that does so.
 ChangeEffect ramp_of(const ChangeEffect& effect, const ChangeEffect& called) {
   ChangeEffect e = effect;
@@ -175,12 +194,16 @@ double ChangeEffect::least_order() const {
 }
 
 Eigen::Index ChangeEffect::freedom() const {
-  return static_cast<Eigen::Index>(ramp ? 1 : count) + (at_place() ? 2 : has_order() || has_scale() ? 1 : 0);
+  return static_cast<Eigen::Index>(ramp ? 1 : count) +
+         (at_place()                   ? 2
+          : has_order() || has_scale() ? 1
+                                       : 0) +
+         (rotor_share > 0 ? 1 : 0);
 }
 
 std::string ChangeEffect::name() const {
   if (at_place()) return id + " at " + to_text(shape);
-  return shape > 0 && !of_size ? id + " " + to_text(shape) + variant : id;
+  return shape > 0 && !of_size ? id + " " + to_text(shape) + variant : rotor_share > 0 ? id + variant : id;
 }
 
 std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
@@ -214,6 +237,9 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
     if (effects.front().id == "backlash") all.push_back(ramp_of(effects.front(), effects.front()));
     for (const double share : kFluctuationSpeeds)
       if (const auto e = fluctuating(effects.front(), share * sampling.speed)) all.push_back(*e);
+    if (effects.front().of_load && effects.front().rubs && !sampling.mesh && !sampling.chain)
+      for (double share = kRotorShare; share < kMostRotorShare + kRotorShare / 2; share += kRotorShare)
+        all.push_back(with_rotor(effects.front(), share));
   }
   return all;
 }
@@ -244,6 +270,7 @@ std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::Vec
   if (values.size() == 1) {
     add(strength.name, strength.unit, values[0], std::sqrt(covariance(0, 0)));
     if (effect.of_load && effect.shape > 0) add("fluctuation_speed", "rad/s", effect.shape, effect.shape);
+    if (effect.rotor_share > 0) add("rotor_share", "-", effect.rotor_share, kRotorShare);
     return out;
   }
   // c cos x + s sin x = A sin(x + p)

@@ -29,6 +29,7 @@ struct ChangeEffect {
   bool of_size = false;                   // `shape` is the size that its columns are right for
   bool rubs = false;                      // a part of friction, the same in both directions
   std::string variant = "";               // which law of several of one term
+  double rotor_share = 0;                 // of one inertia, that loads no teeth
 
   std::vector<OfMoment> columns() const { return law(shape); }
   bool at_place() const { return width > 0; }

@@ -143,6 +143,19 @@ const Case kCases[] = {
 INSTANTIATE_TEST_SUITE_P(Effects, ChangesOf, testing::ValuesIn(kCases),
                          [](const auto& info) { return info.param.effect; });
 
+// Loss of what the load takes, without the rotor's half of the inertia.
+TEST(Changes, FrictionOfTheLoadLeavesOutTheRotor) {
+  const Changes found = changes_of(made(30, 200, [](const Motion& m) {
+    return m.t < kOnset ? 0 : 0.1 * std::fabs(0.5 * 0.45 * m.a + 3 * std::sin(m.q)) * sign(m.w);
+  }));
+  ASSERT_EQ(found.changes.size(), 1u);
+  const Change& c = found.changes.front();
+  EXPECT_EQ(c.effect, "load_dependent_friction");
+  EXPECT_NEAR(c.size.front().measured.value, 0.1, 2 * c.size.front().measured.standard_error);
+  EXPECT_EQ(c.size.back().name, "rotor_share");
+  EXPECT_NEAR(c.size.back().measured.value, 0.5, 2 * c.size.back().measured.standard_error);
+}
+
 // From 120 s on the torque is stamped two samples before it acts.
 TEST(Changes, ATorqueThatActsLaterIsADelay) {
   constexpr std::size_t kLater = 2;

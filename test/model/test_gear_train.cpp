@@ -402,15 +402,19 @@ TEST(GearTrain, DryFrictionAddsItselfAndChangesNothingElse) {
   }
 }
 
-// One inertia whose friction follows what its load takes, T = J a + A sin(q + p), solved by hand for either
-// sign: J a = tau - c w - F - mu |T| - A sin(q + p), so T (1 + mu sign T) = tau - c w - F.
-TEST(GearTrain, FrictionOfOneInertiaFollowsWhatItsLoadTakes) {
+// One inertia whose friction follows what its load takes, T = (1 - r) J a + A sin(q + p), solved by hand for
+// either sign: J a = tau - c w - F - mu |T| - A sin(q + p), so
+// T (1 + (1 - r) mu sign T) = (1 - r) (tau - c w - F) + r A sin(q + p).
+class FrictionOfOneInertia : public testing::TestWithParam<double> {};
+
+TEST_P(FrictionOfOneInertia, FollowsWhatItsLoadTakes) {
+  const double of_load = 1 - GetParam();
   constexpr double kInertia = 0.4, kViscous = 0.9, kCoulomb = 0.8, kCoefficient = 0.2, kGravity = 3;
   Rig rig;
   rig.mesh.rigid = true;
   rig.motor = {kInertia, kViscous};
   rig.motor.coulomb_friction = kCoulomb;
-  ParameterValues values = {{"coefficient", kCoefficient}};
+  ParameterValues values = {{"coefficient", kCoefficient}, {"rotor_share", GetParam()}};
   values.set_choice("body", "motor");
   rig.terms = {make_term("load_dependent_friction", values),
                make_term("gravity", {{"amplitude", kGravity}, {"phase", 0.1}})};
@@ -420,8 +424,10 @@ TEST(GearTrain, FrictionOfOneInertiaFollowsWhatItsLoadTakes) {
     train.begin_friction(0, state, torque);
     train.derivative(0, state, torque, rate);
     const double sliding = torque - kViscous * state[1] - kCoulomb;
-    const double through = sliding / (1 + kCoefficient * (sliding > 0 ? 1 : -1));
-    EXPECT_NEAR(rate[1], (through - kGravity * std::sin(state[0] + 0.1)) / kInertia, 1e-10) << torque;
+    const double pull = kGravity * std::sin(state[0] + 0.1);
+    const double driving = of_load * sliding + GetParam() * pull;
+    const double through = driving / (1 + of_load * kCoefficient * (driving > 0 ? 1 : -1));
+    EXPECT_NEAR(rate[1], (sliding - kCoefficient * std::fabs(through) - pull) / kInertia, 1e-10) << torque;
   }
   // At rest it holds against gravity up to F + mu A sin(q + p).
   const double gravity = kGravity * std::sin(0.2 + 0.1), most = kCoulomb + kCoefficient * gravity;
@@ -432,6 +438,7 @@ TEST(GearTrain, FrictionOfOneInertiaFollowsWhatItsLoadTakes) {
     EXPECT_EQ(train.any_stuck(), share < 1);
   }
 }
+INSTANTIATE_TEST_SUITE_P(RotorShare, FrictionOfOneInertia, testing::Values(0, 0.4, 1));
 
 }  // namespace
 }  // namespace backlash::model

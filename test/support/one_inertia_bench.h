@@ -17,6 +17,7 @@ struct OneInertiaMachine {
   double inertia = 2, coulomb = 3, viscous = 1.5;  // kg m^2, N m, N m s/rad
   std::function<double(double q, double w)> extra = [](double, double) { return 0.0; };  // N m
   double noise = 0.05;                                                                   // N m
+  double weight = 0, loss = 0, rotor = 0;  // N m; - of what the load takes; - of the inertia, that is no load
 };
 
 /// 20 s at 100 Hz of two sines, from about -1.4 to 1.4 rad.
@@ -31,11 +32,12 @@ inline record::Record record_of(const OneInertiaMachine& m, std::uint64_t seed =
     const double w = kFirst * std::cos(kFirst * t) + 0.4 * kSecond * std::cos(kSecond * t + 1);
     const double a =
         -kFirst * kFirst * std::sin(kFirst * t) - 0.4 * kSecond * kSecond * std::sin(kSecond * t + 1);
-    const double friction = m.coulomb * (w > 0 ? 1 : -1) + m.viscous * w;
+    const double weight = m.weight * std::sin(q), load = (1 - m.rotor) * m.inertia * a + weight;
+    const double friction = (m.coulomb + m.loss * std::fabs(load)) * (w > 0 ? 1 : -1) + m.viscous * w;
     record.time.push_back(t);
     record.column(record::Channel::motor_position).push_back(q);
     record.column(record::Channel::motor_torque)
-        .push_back(m.inertia * a + friction + m.extra(q, w) + m.noise * random.normal());
+        .push_back(m.inertia * a + weight + friction + m.extra(q, w) + m.noise * random.normal());
   }
   return record;
 }

@@ -150,8 +150,9 @@ TEST(TakeSimpler, TakesTheNameWithFewerUnknownsWhereThatExplainsTheSame) {
 // wave has.
 TEST(TakeSimpler, ShapesThatAreNotFittedDoNotCount) {
   Effect load;
-  load.candidate = {"load_dependent_friction",
-                    {{{"coefficient", 0.1}, {"fluctuation", 0}, {"fluctuation_speed", 0}}}};
+  load.candidate = {
+      "load_dependent_friction",
+      {{{"coefficient", 0.1}, {"fluctuation", 0}, {"fluctuation_speed", 0}, {"rotor_share", 0}}}};
   load.candidate.terms[0].set_choice("body", "motor");
   Candidate wave = {"position_dependent_friction", {{{"amplitude", 0.3}, {"order", 1}, {"phase", 0.6}}}};
   wave.terms[0].set_choice("body", "motor");
@@ -160,6 +161,20 @@ TEST(TakeSimpler, ShapesThatAreNotFittedDoNotCount) {
   Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
   h.effects = {load};  // as if fitted: any fit that is tried would take its place
   EXPECT_EQ(ids(take_simpler(h, bench.context)), std::vector<std::string>{"load_dependent_friction"});
+}
+
+// 0.05 N m of noise at 2000 samples; the errors that are stated are those of the fit.
+TEST(BestShapes, OfOneInertiaTheRotorLoadsNoTeeth) {
+  OneInertiaMachine machine;
+  machine.weight = 6, machine.loss = 0.15, machine.rotor = 0.4;
+  model::Rig rig = test::one_inertia_rig();
+  rig.terms = {model::make_term("gravity", {{"amplitude", 6}, {"phase", 0}})};
+  const SearchBench bench{rig, {test::record_of(machine, 1), test::record_of(machine, 2)}};
+  const Hypothesis h = add_effects(fit_declared(rig, bench.context), bench.context);
+  ASSERT_EQ(ids(h), std::vector<std::string>{"load_dependent_friction"});
+  const ParameterValues& found = h.effects[0].candidate.terms[0];
+  EXPECT_NEAR(found.at("coefficient"), 0.15, 0.003);
+  EXPECT_NEAR(found.at("rotor_share"), 0.4, 0.03);
 }
 
 TEST(OtherTeeth, AreAsStiffAndDampedUnderTheSameTorque) {
