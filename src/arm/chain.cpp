@@ -38,15 +38,6 @@ Eigen::Matrix4d pseudo_inertia(const BodyParameters& p) {
   return pseudo;
 }
 
-BodyParameters parameters_of_pseudo_inertia(const Eigen::Matrix4d& pseudo) {
-  const Eigen::Matrix3d sigma = pseudo.topLeftCorner<3, 3>();
-  const Eigen::Matrix3d inertia = sigma.trace() * Eigen::Matrix3d::Identity() - sigma;
-  BodyParameters p;
-  p << pseudo(3, 3), pseudo.topRightCorner<3, 1>(), inertia(0, 0), inertia(0, 1), inertia(0, 2),
-      inertia(1, 1), inertia(1, 2), inertia(2, 2);
-  return p;
-}
-
 bool is_consistent(const BodyParameters& p) {
   return signal::symmetric_eigenvalues(Eigen::MatrixXd(pseudo_inertia(p)))[0] > 0;
 }

@@ -41,7 +41,7 @@ std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
 /// Whether the factor of a joint's friction is sure, and more than a robot's warming up.
 bool other_friction_than_trained(const ArmFit& fit, std::size_t joint, const ArmTraceSettings& settings);
 
-/// The same of the last of its effects of a joint; what it gains is from then on that of this joint.
+/// The same of the last effect of a joint; from then on its gain counts as that of this joint.
 std::string effect_refusal(Candidate& c, const Candidate& without, const Motions& judged,
                            const ArmTraceSettings& settings);
 

@@ -176,7 +176,7 @@ class Reader {
     }
   }
 
-  /// The link and all that stands still on it, at a place in the frame of the body.
+  /// The link and all links fixed to it, at a place in the frame of the body.
   void add(Body& to, const urdf::Link& link, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& position,
            const std::string& next) const {
     if (link.inertial) {

@@ -77,7 +77,7 @@ FoundChainChange ChainSearch::scanned(std::size_t effect) const {
   FoundChainChange best{effects_[effect], 0, blocks_, {}, {}, 1, 0, 0, {}};
   for (const ArmJoint& j : joints_) best.inflation = std::max(best.inflation, j.chain_inflation[effect]);
   const Sums sums = sums_of(best.effect);
-  // From the beginning: it came in with another tool.
+  // From the first sample on: the arm came in with another tool.
   best.score = score(sums, 0, blocks_, best.effect);
   for (std::size_t k = margin_; k + margin_ < blocks_; k += 5) {
     EffectSums::Score s = score(sums, k, blocks_, best.effect);

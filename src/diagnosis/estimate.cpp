@@ -37,12 +37,4 @@ std::string contradiction_text(const std::vector<ContradictedValue>& contradicte
   return parts.empty() ? std::string() : joined(parts) + ": run identify";
 }
 
-Status status_from_string(const std::string& text) {
-  for (const auto& [value, name] : kNames) {
-    if (text == name) return value;
-  }
-  throw InvalidParameter(
-      "status", text, "must be ok, below_range, above_range, out_of_domain, insufficient_data or ambiguous");
-}
-
 }  // namespace backlash::diagnosis

@@ -30,7 +30,7 @@ double most_of(const PitchErrors& errors) {
   return std::fabs(errors.runout) + own;
 }
 
-/// The largest -e of the form of a flank, over the travel that counts; quadratic, so at an end or the vertex.
+/// The largest -e of a flank's form over the travel that counts: of a parabola at an end or at the vertex.
 double most_of_form(const ToothErrors& errors, double from, double to) {
   const auto form = [&](double t) {
     return errors.slope * (t - 0.5) + errors.crown * std::pow(2 * t - 1, 2);

@@ -110,7 +110,7 @@ void check_channels(const Sources& sources, const std::string& joint) {
         "must have a torque, a position, the speed of the motor, a current or an acceleration");
 }
 
-/// A name of the package's own format means the same here as there.
+/// A channel keeps the meaning that its name has in the package's own format.
 void check_own_name(const ColumnSource& s, const std::string& source, const std::string& own,
                     const Unit* unit) {
   const std::string name = s.column.substr(s.column.rfind('/') + 1);

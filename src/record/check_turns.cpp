@@ -35,7 +35,7 @@ bool of_two_sources(const std::vector<double>& x) {
   return false;
 }
 
-/// The turns that a position may have been taken modulo of.
+/// Lengths of a turn by which a position may have been wrapped.
 std::vector<double> known_turns(const RecordLook& look, Channel channel) {
   const double axis = channel == Channel::motor_position ? look.declared.axis_ratio : 1;
   std::vector<double> turns = {2 * M_PI * axis, 2 * M_PI, 360};

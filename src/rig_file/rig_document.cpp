@@ -45,7 +45,7 @@ bool has_dash(const std::string& line) {
   return !says_nothing(line) && line[column_of(line)] == '-';
 }
 
-/// The lines of entries that are indented by two, at another column.
+/// The lines of entries that are indented by two, moved to another column.
 std::vector<std::string> indented(const std::vector<std::string>& entries, std::size_t column) {
   std::vector<std::string> lines;
   for (const std::string& entry : entries)

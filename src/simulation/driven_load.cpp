@@ -119,10 +119,6 @@ model::Rig acting_on_load(model::Rig rig) {
   return rig;
 }
 
-bool moves_same_load(const model::Rig& a, const model::Rig& b) {
-  return acting_on_load(a) == acting_on_load(b);
-}
-
 bool load_moves_freely(const model::Rig& rig) {
   return !rig.mesh.rigid && !rig.link_locked;
 }

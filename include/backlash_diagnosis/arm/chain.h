@@ -29,9 +29,6 @@ Body body_of(const BodyParameters& parameters);  // mass != 0
 /// of mass exists that has these parameters (Wensing, Kim and Slotine 2018, IEEE RA-L 3:60).
 Eigen::Matrix4d pseudo_inertia(const BodyParameters& parameters);
 
-/// The parameters of which P is the pseudo inertia.
-BodyParameters parameters_of_pseudo_inertia(const Eigen::Matrix4d& p);
-
 /// Smallest eigenvalue of P > 0.
 bool is_consistent(const BodyParameters& parameters);
 

@@ -19,7 +19,7 @@ class Interruption {
   Interruption(const Interruption&) = delete;
   Interruption& operator=(const Interruption&) = delete;
 
-  /// That of this thread, to be handed on; null where there is none.
+  /// The interruption of this thread, for another thread to take over; null where there is none.
   static std::shared_ptr<State> current();
 
   /// Takes over that of another thread while it lives.

@@ -21,7 +21,6 @@ enum class Status {
   ambiguous,          ///< several backlash values explain the signal equally well
 };
 const char* to_string(Status status);
-Status status_from_string(const std::string& text);  ///< throws InvalidParameter
 
 /// Parts of the play between the two flanks, by estimators that can separate them. Angles at the
 /// motor_position axis.

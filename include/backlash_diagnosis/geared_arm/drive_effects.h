@@ -16,7 +16,7 @@ class DriveEffects {
   DriveEffects() = default;
   DriveEffects(const arm::ArmRig& rig, std::size_t joint);
 
-  /// By which share more is recorded of the motor than it gives, by all gains together.
+  /// Recorded torque of the motor over the torque that it gives, less 1, by all gains together.
   static double recorded_more(const std::vector<arm::JointEffect>& effects);
 
   /// What the drive has to supply for them [N m], without gain and couplings.

@@ -40,7 +40,7 @@ class JointHistory {
   /// Adds the verdict at a stamp [s since 1970] if the interval since the last entry is over; does not wait
   /// for the disk.
   void take(double stamp, const diagnosis::Diagnosis& diagnosis);
-  /// Marks where the healthy machine was taken: the trend begins anew.
+  /// Marks where the baseline was stored: the trend begins there.
   void take_baseline(double stamp, const diagnosis::Diagnosis& diagnosis);
 
   /// Writes the entries that wait, and after new ones computes the trend towards `limit` (service, in the

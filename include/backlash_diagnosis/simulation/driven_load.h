@@ -42,7 +42,7 @@ struct DrivenLoad {
   std::vector<double> mesh_on_motor;
 };
 
-/// All that acts on the motor but its torque and inertia.
+/// All torques on the motor except that of its drive and of its own inertia.
 struct MotorTorques {
   std::vector<double> mean;  // N m, with the mesh, without dry friction; weighted as above
   std::vector<model::FrictionLimits> friction;
@@ -70,13 +70,9 @@ std::vector<DrivenLoad> simulate_driven_loads(const std::vector<model::Rig>& rig
                                               const std::vector<double>& first_loads,
                                               const RecordedMotion& motion, double feedback);
 
-/// A rig reduced to what acts on its load. What is taken away is all that does not: a new member of Rig
-/// counts until it is named there.
+/// A rig reduced to what acts on its load: loads of rigs that are then equal move equally when the motor
+/// does. What is taken away is all that does not: a new member of Rig counts until it is named there.
 model::Rig acting_on_load(model::Rig rig);
-
-/// Whether the loads of both rigs move equally when the motor moves equally. False where any member of Rig
-/// differs but those that are known to act on the motor or on what is shown only.
-bool moves_same_load(const model::Rig& a, const model::Rig& b);
 
 /// Beside a load that has been simulated with this motion, by a rig that may differ in what does not move the
 /// load.

@@ -26,9 +26,9 @@ struct UnseenSize {
   double torque, deflection;
 };
 
-/// Why the effects together are not borne out by the unseen record, beside what the declared machine says of
-/// it; empty: they are. The error of the signal counts, which a delay moves to where it may be smaller. Of
-/// two inertias as drop_stand_ins(): what is left far above the noise must be less than half, in squares.
+/// Why the unseen record contradicts the effects together, compared with the declared machine; empty: it does
+/// not. The error of the signal counts, which a delay moves to where it may be smaller. Of two inertias as
+/// drop_stand_ins(): what is left far above the noise must be less than half, in squares.
 std::string together_not_borne_out(const Hypothesis& h, const Hypothesis& declared, const ServoData& unseen,
                                    const SearchContext& context) {
   const ServoPrediction was = predicted(declared.base->fit.machine, unseen, context.settings.fit),

@@ -265,6 +265,14 @@ std::vector<const model::TermShape*> fitted_shapes(const Candidate& candidate, s
   return all;
 }
 
+std::size_t shape_count(const Candidate& candidate) {
+  std::size_t count = 0;
+  for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
+    for (const ParameterValues& term : candidate.terms)
+      count += !(shape.later > 0 && term.at(shape.name) == 0);
+  return count;
+}
+
 Machine with_candidate(Machine machine, const Candidate& candidate, const model::MotionRange& range) {
   const model::TermSearch& search = *model::term_type(candidate.id).search;
   for (std::size_t i = 0; i < candidate.terms.size(); ++i) {

@@ -29,6 +29,9 @@ struct Candidate {
 /// The shapes of the i-th term of a candidate that are fitted, in the order of their parameters in a fit.
 std::vector<const model::TermShape*> fitted_shapes(const Candidate& candidate, std::size_t term);
 
+/// All shapes of all its terms, fitted or chosen; those that are only tried later do not count before.
+std::size_t shape_count(const Candidate& candidate);
+
 /// The best candidate of each kind and choice, best first. `fit` is the present fit with its sensitivities.
 /// What the fitted parameters could explain by changing does not count as a gain of a candidate.
 std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,

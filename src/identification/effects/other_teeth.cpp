@@ -14,7 +14,7 @@ Machine declared_with(const model::Rig& teeth, const Machine& declared) {
   Machine machine = declared;
   machine.rig = teeth;
   for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
-    // Without the effects that it lacks the machine may have wanted less friction than none.
+    // A machine that lacks effects may have been fitted with friction below zero.
     if (p.is_friction() && p.get(teeth) <= 0) p.set(machine.rig, p.get(declared.rig));
   }
   machine.parameters = declared_parameters(machine.rig);

@@ -22,7 +22,7 @@ struct Plain {
 
 /// Numbers that a fit of it has to find.
 std::size_t unknowns(const Candidate& c) {
-  return probed_terms(c).size() + c.terms.size() * model::term_type(c.id).search->shapes.size();
+  return probed_terms(c).size() + shape_count(c);
 }
 
 /// Where the machine's values are those of its file.

@@ -34,11 +34,6 @@ std::vector<Candidate> at_whole_orders(const Candidate& candidate, const std::ve
   return all;
 }
 
-/// Of all its terms.
-std::size_t shape_count(const Trial& trial) {
-  return trial.candidate.terms.size() * model::term_type(trial.candidate.id).search->shapes.size();
-}
-
 }  // namespace
 
 std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, const SearchContext& context) {
@@ -89,8 +84,9 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
   const auto tied = std::find_if(fitted.begin(), fitted.end(), [&](const Trial& t) {
     return t.residual > (1 + settings.tie) * fitted.front().residual;
   });
-  std::stable_sort(fitted.begin(), tied,
-                   [](const Trial& a, const Trial& b) { return shape_count(a) < shape_count(b); });
+  std::stable_sort(fitted.begin(), tied, [](const Trial& a, const Trial& b) {
+    return shape_count(a.candidate) < shape_count(b.candidate);
+  });
   return all;
 }
 

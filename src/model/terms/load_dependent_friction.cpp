@@ -4,7 +4,7 @@
 // Of one inertia (mesh: rigid) T is what the load takes, (1 - r) J a less the torques of its terms
 // (GearTrain), with r the share of J that is the motor's rotor, which loads no teeth. Hamon, Gautier and
 // Garrec (2010, IROS), "Dynamic identification of robots with a dry friction model depending on load and
-// velocity". A loss is never negative, and below 1 something arrives at the load.
+// velocity". mu is not negative, and below 1: a part of the torque arrives at the load.
 //
 // What the load takes may fluctuate faster than a record shows (teeth, rollers, stick and slip in the
 // bearings), more and more from a speed on: of T + n with n even within +-a,
