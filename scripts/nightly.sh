@@ -18,6 +18,7 @@ parts=(
   "faults bash ${scripts}/fault_campaign.sh --seed 1 --count 20 all"
   "two_hosts bash ${scripts}/two_hosts.sh"
   "soak bash ${scripts}/soak.sh"
+  "soak_robot bash ${scripts}/soak.sh robot"
   "fuzz bash ${scripts}/fuzz.sh 120"
   "sanitize_address bash ${scripts}/sanitize.sh address"
   "sanitize_undefined bash ${scripts}/sanitize.sh undefined"

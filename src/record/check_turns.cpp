@@ -15,6 +15,7 @@ constexpr double kNearTurn = 0.05;   // choice: of the turn, by which the way in
 constexpr double kWholeRange = 0.9;  // choice: of the range of a counter, which a step from end to end makes
 constexpr double kInTurn = 3;        // choice: so many times farther to the next sample than to the one after
 constexpr int kSources = 4;          // choice: samples of the faster of two sources between two of the slower
+constexpr double kLost = 1.5;        // theory: intervals, half a sample more than to the next one
 constexpr double kApart = 0.02;      // choice: of the range, by which two sources differ; ringing makes 0.003
 constexpr double kFewestCounts = 64;     // choice: a counter of fewer steps is a sensor that hardly moves
 constexpr std::size_t kFewestTurns = 2;  // theory: of a counter whose range is not known, there and back
@@ -49,11 +50,21 @@ struct Turns {
   std::vector<std::size_t> after;  // samples
 };
 
+/// How far the motion goes from sample i to the next where samples between them are missing, at the mean of
+/// the speeds before and after.
+double moved_across(const RecordLook& look, const std::vector<double>& x, std::size_t i) {
+  const std::vector<double>& t = look.record.time;
+  const double span = t[i + 1] - t[i];
+  if (span < kLost * look.interval || i == 0 || i + 2 >= x.size()) return 0;
+  const auto speed = [&](std::size_t k) { return (x[k + 1] - x[k]) / (t[k + 1] - t[k]); };
+  return 0.5 * (speed(i - 1) + speed(i + 1)) * span;
+}
+
 /// Steps of about one turn either way. What the position moves in one sample is far less than half a turn.
-Turns turns_of(const std::vector<double>& x, double turn) {
+Turns turns_of(const RecordLook& look, const std::vector<double>& x, double turn) {
   Turns found{turn, {}};
   for (std::size_t i = 0; i + 1 < x.size(); ++i) {
-    const double way = std::fabs(x[i + 1] - x[i]);
+    const double way = std::fabs(x[i + 1] - x[i] - moved_across(look, x, i));
     if (way <= kWayOfTurn * turn) continue;
     if (std::fabs(way - turn) > kNearTurn * turn) return {turn, {}};
     found.after.push_back(i);
@@ -122,7 +133,7 @@ void check_turns(RecordLook& look) {
     }
     Turns turns;
     for (const double turn : known_turns(look, channel))
-      if (turns.after.empty()) turns = turns_of(x, turn);
+      if (turns.after.empty()) turns = turns_of(look, x, turn);
     if (turns.after.empty()) turns = turns_of_counter(x);
     if (!turns.after.empty()) unwrap(look, channel, turns);
   }
