@@ -231,6 +231,29 @@ TEST(RecordCheck, UnwrapsTurnsAndCounters) {
   }
 }
 
+// So many samples are lost that the motor of a joint moves by one of its turns, 2 pi / 110, in that time:
+// from where it is fastest on, at each of its passages.
+TEST(RecordCheck, MotionAcrossLostSamplesIsNoTurn) {
+  DeclaredMotion declared = servo();
+  declared.reduction_ratio = 110;
+  const double turn = 2 * M_PI / declared.reduction_ratio;
+  int tried = 0;
+  for (const int begin : {1000, 2510, 4020, 5490, 7010}) {
+    Record r = healthy();
+    const std::vector<double> q = r.column(Channel::motor_position);
+    const auto from = std::size_t(begin);
+    std::size_t to = from + 1;
+    while (std::fabs(q[to] - q[from]) < turn && to < from + 100) ++to;
+    if (to == from + 100) continue;
+    ++tried;
+    for (std::size_t k = from + 1; k < to; ++k) erase_row(r, from + 1);
+    const CheckedRecord checked = check_record(r, declared);
+    EXPECT_EQ(find(checked.check, FindingKind::wrapped), nullptr) << begin << "\n" << messages(checked.check);
+    EXPECT_EQ(checked.record.column(Channel::motor_position).back(), q.back());
+  }
+  EXPECT_GE(tried, 3);
+}
+
 TEST(RecordCheck, CutsAStretchInWhichAnEncoderStandsStill) {
   Record r = healthy();
   std::vector<double>& load = r.column(Channel::load_position);
