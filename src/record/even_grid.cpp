@@ -40,13 +40,14 @@ std::vector<ClockRun> clock_runs(const std::vector<std::size_t>& row) {
   return runs;
 }
 
-/// Row and time.
+/// Row, and time since the first sample of the run.
 std::pair<double, double> middle_of(const ClockRun& run, const std::vector<std::size_t>& row,
                                     const std::vector<double>& time) {
-  double rows = 0, times = 0;
-  for (std::size_t i = run.from; i < run.to; ++i) rows += double(row[i]), times += time[i] - time[run.from];
   const double n = double(run.to - run.from);
-  return {rows / n, time[run.from] + times / n};
+  double rows = 0, mean = 0;
+  for (std::size_t i = run.from; i < run.to; ++i)
+    rows += double(row[i]), mean += (time[i] - time[run.from]) / n;
+  return {rows / n, mean};
 }
 
 }  // namespace
@@ -63,7 +64,7 @@ std::optional<SampleGrid> grid_of(const std::vector<double>& time, double median
   for (const ClockRun& run : runs) {
     const auto [row, mean] = middle_of(run, g.row, time);
     for (std::size_t i = run.from; i < run.to; ++i) {
-      along += (double(g.row[i]) - row) * (time[i] - mean);
+      along += (double(g.row[i]) - row) * (time[i] - time[run.from] - mean);
       square += std::pow(double(g.row[i]) - row, 2);
     }
   }
@@ -71,7 +72,7 @@ std::optional<SampleGrid> grid_of(const std::vector<double>& time, double median
   for (const ClockRun& run : runs) {
     const auto [row, mean] = middle_of(run, g.row, time);
     const auto on_line = [&, row = row, mean = mean](std::size_t k) {
-      return mean + (double(k) - row) * interval;
+      return time[run.from] + (mean + (double(k) - row) * interval);
     };
     const std::size_t first = g.row[run.from], gap = g.time.size();
     for (std::size_t k = gap; k < first; ++k) {
