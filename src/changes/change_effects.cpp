@@ -16,7 +16,7 @@ constexpr double kLeastFrictionOrder = 1;            // 1/rad, of position-depen
 constexpr double kMostOrder = 80, kOrderStep = 0.5;  // 1/rad. Choice
 constexpr double kMostFrictionOrder = 12;            // 1/rad. Choice
 constexpr double kFluctuationSpeeds[] = {0.4, 0.7, 1, 1.4, 1.8, 2.3};  // - of the rms speed. Choice
-constexpr double kRotorShare = 0.1, kMostRotorShare = 1;  // of one inertia: steps that are tried. Choice
+constexpr int kRotorShares = 10;  // shares of one inertia that are tried, as far from each other. Choice
 const char* const kSlip = "encoder_slip";
 
 double direction(const Moment& m, double) {
@@ -238,8 +238,8 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
     for (const double share : kFluctuationSpeeds)
       if (const auto e = fluctuating(effects.front(), share * sampling.speed)) all.push_back(*e);
     if (effects.front().of_load && effects.front().rubs && !sampling.mesh && !sampling.chain)
-      for (double share = kRotorShare; share < kMostRotorShare + kRotorShare / 2; share += kRotorShare)
-        all.push_back(with_rotor(effects.front(), share));
+      for (int i = 1; i <= kRotorShares; ++i)
+        all.push_back(with_rotor(effects.front(), double(i) / kRotorShares));
   }
   return all;
 }
@@ -270,7 +270,7 @@ std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::Vec
   if (values.size() == 1) {
     add(strength.name, strength.unit, values[0], std::sqrt(covariance(0, 0)));
     if (effect.of_load && effect.shape > 0) add("fluctuation_speed", "rad/s", effect.shape, effect.shape);
-    if (effect.rotor_share > 0) add("rotor_share", "-", effect.rotor_share, kRotorShare);
+    if (effect.rotor_share > 0) add("rotor_share", "-", effect.rotor_share, 1.0 / kRotorShares);
     return out;
   }
   // c cos x + s sin x = A sin(x + p)

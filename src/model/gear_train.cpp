@@ -275,7 +275,7 @@ double GearTrain::torque_of_load(const Motion& motion, double acceleration) cons
 
 /// Under these torques without dry friction. Of one body, friction that follows what the load takes is found
 /// with the acceleration that it leaves, for either direction; each step comes nearer by the factor by which
-/// friction grows with that torque. What is left has the sign of that at rest: nothing else for sticking.
+/// friction grows with that torque. What is left has the sign that it has at rest, which serves for sticking.
 EndFriction GearTrain::friction_under(const Motion& motion, const double* net) const {
   if (!friction_of_load_) return friction(motion);
   const double all = net[layout_.node[kMotor]], inertia = inertia_[layout_.node[kMotor]];

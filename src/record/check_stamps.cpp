@@ -13,7 +13,6 @@
 namespace backlash::record {
 namespace {
 
-constexpr double kMissing = 0.5;   // theory: of an interval, half of what one lost sample adds
 constexpr double kJitters = 0.01;  // choice: of an interval, standard deviation worth a look at the motion
 constexpr double kOnGrid = 0.5;    // theory: of an interval, beyond which a stamp is nearer to another row
 constexpr double kSteady = 0.2;    // choice: of the speed, by which it may change across a step of the clock

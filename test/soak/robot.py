@@ -43,6 +43,8 @@ class Watch:
                              rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics)]
 
     def _on_estimate(self, message):
+        if message.status != message.OK:
+            return
         now = time.monotonic()
         with self.lock:
             joint = message.joint
@@ -67,7 +69,7 @@ class Watch:
         """What was said while the robot was learned does not count."""
         with self.lock:
             self.last, self.oldest, self.estimates = {}, {}, {}
-            self.news, self.warned = [], []
+            self.news, self.warned, self.status = [], [], {}
 
     def age(self, joint):
         """The oldest that its newest running estimate ever was."""
@@ -109,7 +111,7 @@ class Run:
     """The launched robot, its watch, and the memory of its nodes."""
 
     def __init__(self, m, seconds):
-        self.m, self.end, self.watch = m, None, None
+        self.m, self.watch = m, None
         self.seconds, self.memory = seconds, {node: [] for node in NODES}
         self.history = m.path("history")
         os.mkdir(self.history)
@@ -118,8 +120,7 @@ class Run:
                               "history:=" + self.history)
 
     def begin(self):
-        self.m.wait_for(lambda: "/change_watch/diagnose" in self.m.run("here", "rosservice", "list", check=False) or
-                        "/simulator/wrist/set_rig" in self.m.run("here", "rosservice", "list", check=False),
+        self.m.wait_for(lambda: "/simulator/wrist/set_rig" in self.m.run("here", "rosservice", "list", check=False),
                         "the robot", self.launch)
         self.watch = Watch()
         self.processes = {node: pid_of(node) for node in NODES}

@@ -119,7 +119,7 @@ TEST_F(ChangedRecords, AnEncoderThatStoodStillCostsThatTime) {
 }
 
 // Its clock begins anew between the samples of the first part.
-TEST_F(ChangedRecords, AFasterDriveIsADelay) {
+TEST_F(ChangedRecords, ASlowerDriveIsADelay) {
   const auto rig = find_data("robot_joints/joint_12/rig.yaml");
   names("robot_joints/joint_12/", rig ? *rig : "", "today.csv", "delay", 80, [](Record r) { return r; });
 }
