@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """simulated_robot.launch with changes:=true: the healthy robot is learned from its own topics, then joints change."""
+import json
 import os
 import shutil
 import subprocess
@@ -65,13 +66,14 @@ class ChangeWatchTest(unittest.TestCase):
     def setUpClass(cls):
         cls.statuses = Statuses()
         cls.reports = Inbox("/changes", ChangeReport)
+        cls.folder = rospy.get_param("/change_watch/folder")
         rospy.wait_for_service("/simulator/wrist/set_rig", TIMEOUT)
         cls.set_rig = rospy.ServiceProxy("/simulator/wrist/set_rig", SetRig)
         cls.set_backlash = rospy.ServiceProxy("/simulator/shoulder/set_backlash", SetBacklash)
 
     @classmethod
     def tearDownClass(cls):
-        shutil.rmtree(rospy.get_param("/change_watch/folder"), ignore_errors=True)
+        shutil.rmtree(cls.folder, ignore_errors=True)
 
     def change_by(self, added):
         """Between which two stamps the joint became another."""
@@ -101,7 +103,7 @@ class ChangeWatchTest(unittest.TestCase):
     def test_2_a_healthy_robot_has_not_changed(self):
         # 40 s of wall time are simulated before it can be learned, and three joints are learned by one after the other.
         self.statuses.wait_for("wrist: model", lambda s: s.level == DiagnosticStatus.OK, "OK", 2 * TIMEOUT)
-        learned = os.path.join(rospy.get_param("/change_watch/folder"), "wrist_healthy.csv")
+        learned = os.path.join(self.folder, "wrist_healthy.csv")
         self.assertTrue(os.path.exists(learned), learned)
         status = self.looked(3)
         self.assertEqual((status.level, self.reports.messages), (DiagnosticStatus.OK, []), status.message)
@@ -122,6 +124,14 @@ class ChangeWatchTest(unittest.TestCase):
         self.assertLess(change.error_after, change.error_before)
         self.statuses.wait_for("wrist: model", lambda s: s.level == DiagnosticStatus.WARN
                                and s.message.startswith("changed: motor_coulomb since "), "warning")
+        # What it saw, the command sees in the record that the node has kept of it.
+        kept = [os.path.join(self.folder, "wrist_%s.csv" % what) for what in ("healthy", "changed")]
+        seen = os.path.join(self.folder, "seen.json")
+        rig = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), "config", "simulated_robot", "wrist.yaml")
+        subprocess.run(["rosrun", PACKAGE, "detect_changes", "--rig", rig, "--healthy", kept[0], "--json", seen, kept[1]],
+                       timeout=TIMEOUT, check=False)
+        with open(seen) as found:
+            self.assertIn("motor_coulomb", [c["effect"] for c in json.load(found)["changes"]])
 
     def test_4_what_is_undone_has_an_end(self):
         before, after = self.change_by(0)

@@ -8,6 +8,7 @@ memory of the nodes. Exit codes: 0 all as it should be, 1 not.
 import argparse
 import json
 import os
+import shutil
 import statistics
 import sys
 import threading
@@ -156,11 +157,13 @@ def resident(pid):
         return int(next(line for line in status if line.startswith("VmRSS:")).split()[1]) / 1024
 
 
-def robot_rows(run):
+def robot_rows(run, folder):
     watch = run.watch
     set_backlash, set_rig = services()
     run.until(0.6)
     cried = [c.text for _, c in watch.news] + ["%s: %s" % w[1:] for w in watch.warned]
+    if cried:  # what it saw, for whoever asks why
+        shutil.copytree(run.m.path("ros/backlash_diagnosis"), folder, dirs_exist_ok=True)
     rows = [("cried of the healthy robot", "; ".join(cried) or "nothing", not cried)]
     worn = time.monotonic()
     set_backlash(WORN)
@@ -185,7 +188,7 @@ def robot_rows(run):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("minutes", nargs="?", type=float, default=30, help="of wall time, after it has learned; default 30")
-    parser.add_argument("--json", default="soak_robot.json", help="report to write; default soak_robot.json")
+    parser.add_argument("--json", default="soak_robot.json", help="report to write; default soak_robot.json; records of what it cried beside it")
     arguments = parser.parse_args()
     if arguments.minutes < 10:
         parser.error("minutes = %g: must be at least 10, as each change has a fifth of them" % arguments.minutes)
@@ -197,7 +200,7 @@ def main():
         m.roscore("here", port)
         run = Run(m, 60 * arguments.minutes)
         run.begin()
-        rows = robot_rows(run)
+        rows = robot_rows(run, os.path.splitext(arguments.json)[0] + "_cried")
         for node in NODES:
             late = [size for at, size in run.memory[node] if at >= 0.2 * run.seconds]
             middle, end = (statistics.median(late[k:k + len(late) // 2]) for k in (0, len(late) // 2))

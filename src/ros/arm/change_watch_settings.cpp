@@ -57,7 +57,7 @@ parameters (private)
   JOINT/rig, JOINT/channels, JOINT/healthy   the same for one of several joints; of an arm JOINT/channels
             only, default: position and effort of JOINT
   folder    where JOINT_healthy.csv is kept, the record that was learned from: delete it to learn anew;
-            default: backlash_diagnosis in ROS_HOME (~/.ros)
+            and JOINT_changed.csv, what the last look saw that reported a change; default: backlash_diagnosis in ROS_HOME (~/.ros)
   history   folder, which must exist, for a file JOINT_changes.csv with all that was reported; default: none
   queue     messages waiting at most; default 20000
   stale     s of wall time without a message before /diagnostics says so; default 2
@@ -129,6 +129,7 @@ ChangeWatchSettings load_change_watch_settings(const ros::NodeHandle& private_ha
     const std::string& name = watch.joint.joint;
     watch.healthy = parameters.texts(name + "/healthy", common.healthy);
     watch.learned = joint_path(folder.path(), name, "_healthy.csv");
+    watch.changed = joint_path(folder.path(), name, "_changed.csv");
     if (!history.empty()) watch.log = joint_path(history, name, "_changes.csv");
     watch.rate = diagnosis::rate_of_look(rate, watch.window, watch.check_interval, all.size());
     settings.joints.push_back(std::move(watch));

@@ -240,6 +240,7 @@ void JointWatch::learn(const Task& task, const Progress& go_on) {
 
 std::vector<diagnosis::KnownChange> JointWatch::judge(const Task& task, const diagnosis::ChangeLook& look) {
   std::vector<diagnosis::KnownChange> news;
+  bool differs = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     // Of another run of the clock: its times mean nothing any more.
@@ -250,17 +251,21 @@ std::vector<diagnosis::KnownChange> JointWatch::judge(const Task& task, const di
     state_.to = look.to;
     state_.windows = look.windows;
     state_.unjudged = look.unjudged;
+    differs = ledger_.unexplained_difference().empty();
     for (const long id : ledger_.take(look)) news.push_back(ledger_.change(id));
+    differs = differs && !ledger_.unexplained_difference().empty();
   }
+  if (news.empty() && !differs) return news;
   std::string problem;
   try {
     if (!settings_.log.empty())
       for (const diagnosis::KnownChange& change : news) diagnosis::append_change(settings_.log, change);
+    write(task.joints, settings_.changed);
   } catch (const Error& error) {
     problem = error.what();
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!news.empty()) state_.log_problem = problem;
+  state_.log_problem = problem;
   return news;
 }
 

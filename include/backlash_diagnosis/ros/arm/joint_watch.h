@@ -26,6 +26,7 @@ struct WatchSettings {
   std::vector<record::ChannelMap> arm_joints;  // where they are published
   std::vector<std::string> healthy;            // records of the healthy machine; empty: it is learned
   std::string learned;             // record that is written where it is learned, and taken where it exists
+  std::string changed;             // record that is written: that of the last look with something to report
   std::string log;                 // of diagnosis/change_log.h; empty: none
   double learn = 600;              // s of samples that the healthy machine is learned from, > 0
   double window = 300;             // s that a look sees, > 0
@@ -50,7 +51,7 @@ struct WatchState {
   long looks = 0, judged = 0;  // done, and those with an answer
   long left_out = 0;           // looks that were due while one ran
   std::string why_not;         // why the last look has no answer; empty: it has one
-  std::string log_problem;     // why what was reported is not in the log
+  std::string log_problem;     // why what was reported is not in the log, or its record not written
   double from = 0, to = 0;     // s since 1970, of the last look with an answer
   long windows = 0;            // of motion, in it
   std::vector<diagnosis::KnownChange> changes;
