@@ -19,7 +19,7 @@ executables=${WS}/devel/lib/${PACKAGE}
 servo=${REPO}/config/two_inertia_servo.yaml joint=${REPO}/config/ur10e_joint.yaml
 friction=asymmetric_coulomb,asymmetric_viscous,stribeck,quadratic_drag,load_dependent_friction,position_dependent_friction
 either=${friction},friction_drift,gravity,cogging,delay,presliding
-teeth=transmission_error,varying_backlash,mesh_hardening,varying_reduction_ratio,encoder_scale,local_fault
+teeth=transmission_error,varying_backlash,mesh_hardening,mesh_hysteresis,varying_reduction_ratio,encoder_scale,local_fault
 
 # study NAME OPTION...
 study() {

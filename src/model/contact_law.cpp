@@ -26,7 +26,7 @@ const std::vector<ContactLawType>& contact_laws() {
       linear_contact(),       power_law_contact(),           hunt_crossley_contact(),
       kelvin_voigt_contact(), herbert_mcwhannell_contact(),  yang_sun_contact(),
       jankowski_contact(),    lankarani_nikravesh_contact(), stereomechanical_contact(),
-      foundation_contact()};
+      foundation_contact(),   hertz_in_series_contact()};
   return laws;
 }
 

@@ -28,6 +28,7 @@ std::vector<TermType>& registry() {
                                         load_dependent_friction_term(),
                                         local_fault_term(),
                                         mesh_hardening_term(),
+                                        mesh_hysteresis_term(),
                                         position_dependent_friction_term(),
                                         presliding_term(),
                                         quadratic_drag_term(),

@@ -61,7 +61,8 @@ JOINTS = ["none"] * 4 + ["gravity,load_dependent_friction"] * 6 + [
     "outside_torque", "gravity,outside_torque", "wandering_torque", "gravity,wandering_torque", "friction_swing",
     "gravity,friction_swing", "payload_step", "gravity,payload_step"]
 RIGS = {"servo": "config/two_inertia_servo.yaml", "joint": "config/ur10e_joint.yaml"}
-# Joints of a robot's size with two encoders, recorded as by ROS, by make_robot_joint; twice each.
+# Joints of a robot's size with two encoders, recorded as by ROS, by make_robot_joint; with linear teeth and
+# Coulomb friction, and with teeth and friction of all kinds.
 ROBOTS = ["none", "cogging", "stribeck", "load_dependent_friction", "position_dependent_friction", "transmission_error",
           "varying_backlash", "gravity", "asymmetric_coulomb"]
 GROUPS = ("clean", "noisy", "joint", "robot")
@@ -94,10 +95,11 @@ def suite(first_seed):
         add(effects, options, "clean")
     for effects in JOINTS:
         add(effects, [], "joint")
-    for effect in ROBOTS + ROBOTS:
-        seed = first_seed + len(cases)
-        cases.append(Case(f"{len(cases):03d}_robot_{effect}", effect,
-                          ["--seed", str(seed), "--effect", effect, "--duration", "18"], "robot"))
+    for teeth, more in (("", []), ("_own_teeth", ["--own-teeth"])):
+        for effect in ROBOTS:
+            seed = first_seed + len(cases)
+            cases.append(Case(f"{len(cases):03d}_robot_{effect}{teeth}", effect,
+                              ["--seed", str(seed), "--effect", effect, "--duration", "18"] + more, "robot"))
     return cases
 
 

@@ -55,6 +55,10 @@ std::vector<NamedLaw> all_laws() {
                                                       {"thickness", 2e-3},
                                                       {"share", 0.4}})});
     }
+    // Nothing yields behind the contact, so that the elastic part is that of Hertz.
+    laws.push_back({"hertz_in_series", k, 1.5,
+                    make_contact_law("hertz_in_series",
+                                     {{"stiffness", k}, {"series_stiffness", 1e30}, {"damping", 300}})});
     laws.push_back(
         {"kelvin_voigt", k, 1, make_contact_law("kelvin_voigt", {{"stiffness", k}, {"damping", 300}})});
     laws.push_back(
@@ -106,6 +110,30 @@ TEST(ContactLaws, DampingIsThatOfTheEquations) {
   // 100 N at rest; 2 pi R = 0.1 m, eta / h = 2e7 Pa s/m: 0.1 * 2e7 * 0.75 = 1.5e6 N s/m^2, times 1e-4 m
   EXPECT_NEAR(foundation->force(1e-4, 0.2, 0), 130, 1e-12);
   EXPECT_NEAR(foundation->force(1e-4, -0.2, 0), 70, 1e-12);
+}
+
+TEST(ContactLaws, HertzInSeriesIsBothBehindEachOther) {
+  const double contact = 1e8, behind = 2e6;
+  const Law law = make_contact_law("hertz_in_series",
+                                   {{"stiffness", contact}, {"series_stiffness", behind}, {"damping", 40}});
+  // 100 N press the contact by (100 / 1e8)^(2/3) = 1e-4 m and what is behind it by 5e-5 m.
+  EXPECT_NEAR(law->force(1.5e-4, 0, 0), 100, 1e-11);
+  EXPECT_NEAR(law->force(1.5e-4, 0.03, 0), 101.2, 1e-11);
+  EXPECT_NEAR(law->force(1.5e-4, -0.03, 0), 98.8, 1e-11);
+  EXPECT_EQ(law->force(1.5e-4, -1e3, 0), 0);
+  for (const double force : {1e-6, 1.0, 1e5}) {
+    const double d = force / behind + std::pow(force / contact, 2.0 / 3);
+    EXPECT_NEAR(law->force(d, 0, 0), force, 1e-12 * force);
+    EXPECT_NEAR(law->static_penetration(force), d, 1e-15 * d);
+    // Energies of both springs, by hand: F^2 / (2 Ks) and 2/5 K d^(5/2).
+    EXPECT_NEAR(law->elastic_energy(d),
+                0.5 * force * force / behind + 0.4 * contact * std::pow(force / contact, 5.0 / 3),
+                1e-12 * force * d);
+  }
+  // What is behind it alone where the contact does not yield: the linear law.
+  const Law stiff = make_contact_law("hertz_in_series",
+                                     {{"stiffness", 1e20}, {"series_stiffness", behind}, {"damping", 40}});
+  EXPECT_NEAR(stiff->force(1e-4, 0.1, 0), 204, 1e-3);
 }
 
 TEST(ContactLaws, NoneButKelvinVoigtPulls) {

@@ -135,10 +135,11 @@ TEST(TermSearches, TryEveryEffectThatIsToBeFoundWithFewCombinations) {
     EXPECT_GE(count, 1) << type.id;
     EXPECT_LE(count, 250) << type.id;
   }
-  for (const char* id : {"asymmetric_coulomb", "asymmetric_viscous", "backlash", "cogging", "friction_drift",
-                         "gravity", "load_dependent_friction", "local_fault", "mesh_hardening",
-                         "position_dependent_friction", "quadratic_drag", "square_root_friction", "stribeck",
-                         "transmission_error", "varying_backlash", "varying_reduction_ratio"})
+  for (const char* id :
+       {"asymmetric_coulomb", "asymmetric_viscous", "backlash", "cogging", "friction_drift", "gravity",
+        "load_dependent_friction", "local_fault", "mesh_hardening", "mesh_hysteresis",
+        "position_dependent_friction", "quadratic_drag", "square_root_friction", "stribeck",
+        "transmission_error", "varying_backlash", "varying_reduction_ratio"})
     EXPECT_EQ(sought.count(id), 1u) << id;
 }
 

@@ -263,6 +263,7 @@ std::map<std::string, ParameterValues> laws_of_the_rig() {
           {"yang_sun", falling},
           {"lankarani_nikravesh",
            {{"stiffness", 2.28e8}, {"exponent", 1.5}, {"restitution", 0.8}, {"minimum_speed", 5e-3}}},
+          {"hertz_in_series", {{"stiffness", 2.28e8}, {"series_stiffness", 2e7}, {"damping", 30}}},
           {"jankowski", {{"stiffness", 2.28e8}, {"restitution", 0.8}, {"effective_mass", 0.047}}},
           {"stereomechanical",
            {{"restitution", 0.8}, {"resting_speed", 2e-3}, {"stiffness", 5e6}, {"damping", 30}}},

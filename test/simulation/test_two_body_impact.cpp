@@ -146,6 +146,11 @@ std::vector<Case> all_cases() {
              {{"stiffness", kStiffness}, {"exponent", n}, {"restitution", 0.5}, {"minimum_speed", 1e-3}}),
          [](double) { return model::restitution_of_damping(0.75 * 0.75); }});
   }
+  cases.push_back({"hertz_in_series", 1.5,
+                   model::make_contact_law(
+                       "hertz_in_series",
+                       {{"stiffness", kStiffness}, {"series_stiffness", 0.1 * kStiffness}, {"damping", 0}}),
+                   [](double) { return 1.0; }});
   for (double e : {0.9, 0.5})
     cases.push_back(
         {"jankowski", 1.5,

@@ -205,9 +205,9 @@ struct TermType {
   // missing only if the record shows it.
   bool shapes_friction = false;
   // Of effects that every machine has to some extent: a strength up to these fractions of the motor's dry
-  // friction, of the backlash angle, and as one wave per turn of a declared weight, is put into the model,
-  // but not reported as missing.
-  double usual_of_friction = 0, usual_of_gap = 0, usual_of_weight = 0;
+  // friction, of the backlash angle, and as one wave per turn of a declared weight, or a share up to this
+  // one, is put into the model, but not reported as missing.
+  double usual_of_friction = 0, usual_of_gap = 0, usual_of_weight = 0, usual_share = 0;
   // Together with the declared contact law it can do what another contact law would do alone.
   bool stands_in_for_contact_law = false;
 };

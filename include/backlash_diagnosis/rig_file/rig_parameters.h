@@ -19,7 +19,8 @@ enum class ParameterKind {
   inertia,
   stiffness,
   damping,
-  damping_factor,  // of a contact law whose damping grows with the force: alpha of Hunt and Crossley (1975)
+  series_stiffness,  // of what yields behind the contact of the teeth
+  damping_factor,    // of a contact law whose damping grows with the force: alpha of Hunt and Crossley (1975)
   backlash,
   start_in_gap,  // where in the gap both positions are 0
   coulomb_friction,
@@ -53,9 +54,9 @@ struct RigParameter {
 };
 
 /// Of two inertias with a mesh between them: motor_inertia load_inertia mesh_stiffness mesh_damping
-/// mesh_alpha backlash_angle motor_coulomb motor_viscous load_coulomb load_viscous, then where directions
-/// differ motor_coulomb_asymmetry, motor_viscous_asymmetry, load_coulomb_asymmetry, load_viscous_asymmetry,
-/// start_in_gap, and encoder_skew. Setting may make a rig that GearTrain refuses.
+/// mesh_series_stiffness mesh_alpha backlash_angle motor_coulomb motor_viscous load_coulomb load_viscous,
+/// then where directions differ motor_coulomb_asymmetry, motor_viscous_asymmetry, load_coulomb_asymmetry,
+/// load_viscous_asymmetry, start_in_gap, and encoder_skew. Setting may make a rig that GearTrain refuses.
 const std::vector<RigParameter>& servo_parameters();
 
 /// By name, or by what it is (of both directions: the mean). Throw InvalidParameter for one that is not in

@@ -24,13 +24,13 @@ HeldOut held_out_of(const Trial& trial, const Hypothesis& h, const SearchContext
 }
 
 /// The other trials that gain nearly as much as `best`.
-std::vector<Candidate> alternatives(const Trial& best, double gain, const std::vector<Trial>& trials,
-                                    const HeldOut& now, const Hypothesis& h, const SearchContext& context) {
-  std::vector<Candidate> all;
+std::vector<Fitted> alternatives(const Trial& best, double gain, const std::vector<Trial>& trials,
+                                 const HeldOut& now, const Hypothesis& h, const SearchContext& context) {
+  std::vector<Fitted> all;
   for (const Trial& other : trials) {
     if (other.candidate.id == best.candidate.id) continue;
-    if (compare(now, held_out_of(other, h, context)).total >= context.settings.revision.alike * gain)
-      all.push_back(other.candidate);
+    const Gain of_other = compare(now, held_out_of(other, h, context));
+    if (of_other.total >= context.settings.revision.alike * gain) all.push_back({other.candidate, of_other});
   }
   return all;
 }
@@ -65,8 +65,10 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
       continue;
     }
     std::vector<Effect> effects = h.effects;
-    effects.push_back(
-        {best.candidate, gain, alternatives(best, gain.total, trials.fitted, now, before, context), {}, {}});
+    effects.push_back({{best.candidate, gain},
+                       alternatives(best, gain.total, trials.fitted, now, before, context),
+                       {},
+                       {}});
     auto with = refitted(h, std::move(effects), context, Settled::roughly);
     std::string why = with ? contradicted_by_unseen(*with, context) : kNotFitted;
     if (!why.empty())

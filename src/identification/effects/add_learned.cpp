@@ -50,7 +50,7 @@ Hypothesis add_map(const Hypothesis& before, const SearchContext& context) {
       reason = "lessens the residual in blocks left out of the fit by too little";
     if (reason.empty()) {
       std::vector<Effect> effects = h.effects;
-      effects.push_back({trial->candidate, gain, {}, nearest_effects(h, context), {}});
+      effects.push_back({{trial->candidate, gain}, {}, nearest_effects(h, context), {}});
       if (auto with = refitted(h, std::move(effects), context)) return *with;
       reason = "the machine cannot be fitted with it at new weights";
     }

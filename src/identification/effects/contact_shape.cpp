@@ -4,6 +4,11 @@
 #include <cmath>
 
 namespace backlash::identification {
+namespace {
+
+constexpr double kOfTeeth = 0.5;  // choice: of the deflection, a start
+
+}  // namespace
 
 std::optional<model::Rig> with_hertzian_teeth(const model::Rig& rig, double torque) {
   const model::ContactSpec& linear = rig.mesh.contact_spec();
@@ -11,11 +16,11 @@ std::optional<model::Rig> with_hertzian_teeth(const model::Rig& rig, double torq
   const double stiffness = linear.values.at("stiffness"), damping = linear.values.at("damping");
   const double force = torque / rig.mesh.lever(), depth = force / stiffness;
   ParameterValues values;
-  values["stiffness"] = stiffness / std::sqrt(depth);
-  values["exponent"] = 1.5;
-  values["alpha"] = damping / (1.5 * force);
+  values["stiffness"] = force / std::pow(kOfTeeth * depth, 1.5);
+  values["series_stiffness"] = stiffness / (1 - kOfTeeth);
+  values["damping"] = damping;
   model::Rig other = rig;
-  other.mesh.contact = model::make_contact_law("hunt_crossley", values);
+  other.mesh.contact = model::make_contact_law("hertz_in_series", values);
   return other;
 }
 

@@ -289,9 +289,9 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   describe_errors(result, on_test, records, settings.fit, trace);
   if (found.other_teeth)
     trace.notes.emplace_back(
-        "the teeth are Hertzian (force with the power 1.5 of the penetration), not linear as declared; so "
-        "they are in "
-        "the model, but nothing is called missing for it");
+        "the teeth are Hertzian before a spring, not linear as declared (contact law hertz_in_series); so "
+        "they "
+        "are in the model, but nothing is called missing for it");
   note_shape_of_friction(
       found,
       simulation::load_moves_freely(declared) ? settings.shape_of_friction : settings.shape_of_all_torque,

@@ -65,9 +65,10 @@ void describe(const model::Term& term, const Candidate& candidate, std::size_t t
 /// Each other effect that reaches most of the gain, once, and what is none and looks the same.
 std::vector<std::string> ids_of(const Effect& effect) {
   std::vector<std::string> ids;
-  for (const Candidate& c : effect.alternatives)
-    if (c.id != effect.candidate.id && std::find(ids.begin(), ids.end(), c.id) == ids.end())
-      ids.push_back(c.id);
+  for (const Fitted& alternative : effect.alternatives) {
+    const std::string& id = alternative.candidate.id;
+    if (id != effect.candidate.id && std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
+  }
   for (const std::string& other : model::looks_like(model::term_type(effect.candidate.id)))
     ids.push_back(other);
   return ids;

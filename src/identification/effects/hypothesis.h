@@ -21,10 +21,14 @@
 namespace backlash::identification {
 
 /// An effect that is in the model.
-struct Effect {
-  Candidate candidate;  // with fitted values
+/// With fitted values, and what it explains.
+struct Fitted {
+  Candidate candidate;
   Gain gain;
-  std::vector<Candidate> alternatives;   // other effects that reach most of its gain, as fitted
+};
+
+struct Effect : Fitted {
+  std::vector<Fitted> alternatives;      // other effects that reach most of its gain, as fitted
   std::vector<std::string> nearest;      // of a learned map: named effects that explain part of the same
   std::shared_ptr<const Machine> after;  // fitted with this effect and those before it
 };

@@ -21,12 +21,6 @@ Machine declared_with(const model::Rig& teeth, const Machine& declared) {
   return machine;
 }
 
-/// The machine as it is fitted now, with other teeth.
-std::shared_ptr<const BandFit> with_teeth(BandFit fitted, const model::Mesh& teeth) {
-  fitted.fit.machine.rig.mesh.contact = teeth.contact;
-  return std::make_shared<const BandFit>(std::move(fitted));
-}
-
 std::vector<Effect> without_stand_ins_for_teeth(std::vector<Effect> effects) {
   effects.erase(
       std::remove_if(effects.begin(), effects.end(),
@@ -35,20 +29,23 @@ std::vector<Effect> without_stand_ins_for_teeth(std::vector<Effect> effects) {
   return effects;
 }
 
-Hypothesis fitted_with(const model::Rig& teeth, const std::vector<Effect>& effects, const Hypothesis& h,
-                       const SearchContext& context) {
-  Hypothesis start = h;
-  start.declared = std::make_shared<const Machine>(declared_with(teeth, *h.declared));
-  start.fitted = with_teeth(*h.fitted, teeth.mesh);
-  std::optional<Hypothesis> with_effects;
-  if (!effects.empty()) with_effects = refitted(start, effects, context);
-  Hypothesis other = with_effects ? *with_effects : start;
+/// Of each effect the machine with those before it is kept, which the unseen record compares: all of these
+/// have the other teeth.
+std::optional<Hypothesis> fitted_with(const model::Rig& teeth, const std::vector<Effect>& effects,
+                                      const Hypothesis& h, const SearchContext& context) {
+  Hypothesis other = h;
+  other.declared = std::make_shared<const Machine>(declared_with(teeth, *h.declared));
   other.base = std::make_shared<const BandFit>(fit_to_records(
       context.data, *other.declared, context.settings.fit, [&] { context.report("trying other teeth"); }));
+  other.fitted = other.base;
+  other.effects.clear();
   other.other_teeth = true;
-  if (!with_effects) {
-    other.effects.clear();
-    other.fitted = other.base;
+  for (const Effect& effect : effects) {
+    std::vector<Effect> more = other.effects;
+    more.push_back(effect);
+    auto with = refitted(other, std::move(more), context);
+    if (!with) return std::nullopt;
+    other = std::move(*with);
   }
   context.report_hypothesis(other);
   return other;
@@ -58,12 +55,13 @@ Hypothesis fitted_with(const model::Rig& teeth, const std::vector<Effect>& effec
 
 std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context) {
   const std::vector<Effect> others = without_stand_ins_for_teeth(h.effects);
-  if (others.size() == h.effects.size() || clearly_right(misfit(h), context)) return std::nullopt;
+  if (clearly_right(misfit(h), context)) return std::nullopt;
   // Of the machine without hardening, which has a stiffness of its own.
   const auto teeth = with_hertzian_teeth(h.base->fit.machine.rig, context.range.torque);
   if (!teeth) return std::nullopt;
   context.report("trying other teeth");
-  const auto other = attempted([&] { return fitted_with(*teeth, others, h, context); });
+  const auto fitted = attempted([&] { return fitted_with(*teeth, others, h, context); });
+  const auto other = fitted ? *fitted : std::nullopt;
   if (!other || size(*other) >= context.settings.revision.clearly_less * size(h)) return std::nullopt;
   Hypothesis result = *other;
   for (const Effect& effect : h.effects)

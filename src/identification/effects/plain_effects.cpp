@@ -74,16 +74,21 @@ std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& co
   return all;
 }
 
+Fitted fitted(const Plain& p, const SearchSettings& settings) {
+  const Balance::Explained& e = p.explained;
+  Fitted f{p.candidate, {}};
+  f.gain.deflection = e.deflection;
+  f.gain.evidence = {e.gain, e.gain_held_out, e.gain_forward, e.better, settings.acceptance.blocks};
+  return f;
+}
+
 /// One of them, with the others that explain nearly as much of the same channel.
 Effect effect_of(const Plain& best, const std::vector<Plain>& plain, const SearchSettings& settings) {
-  Effect effect{best.candidate, {}, {}, {}, {}};
-  effect.gain.deflection = best.explained.deflection;
-  const Balance::Explained& e = best.explained;
-  effect.gain.evidence = {e.gain, e.gain_held_out, e.gain_forward, e.better, settings.acceptance.blocks};
+  Effect effect{fitted(best, settings), {}, {}, {}};
   for (const Plain& other : plain)
     if (other.candidate.id != best.candidate.id && other.explained.deflection == best.explained.deflection &&
         other.explained.gain_held_out >= settings.revision.alike * best.explained.gain_held_out)
-      effect.alternatives.push_back(other.candidate);
+      effect.alternatives.push_back(fitted(other, settings));
   return effect;
 }
 

@@ -99,15 +99,17 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
     result.found = believe_compliance(result.declared, unseen, context);
     return result;
   }
-  if (const auto plain = plain_effects(result.declared, unseen, context)) {
+  Hypothesis machine = result.declared;
+  if (const auto other = with_other_teeth(machine, context)) machine = *other;
+  if (const auto plain = plain_effects(machine, unseen, context)) {
     result.found = *plain;
     return result;
   }
-  Hypothesis h = add_effects_or_teeth(result.declared, context);
+  Hypothesis h = add_effects_or_teeth(machine, context);
   h = take_simpler(h, context);
   h = add_learned(h, context);
   h = drop_stand_ins(h, context);
-  result.found = believe_all(h, result.declared, unseen, context);
+  result.found = believe_all(h, machine, unseen, context);
   return result;
 }
 

@@ -27,8 +27,8 @@ Hypothesis add_effects(const Hypothesis& h, const SearchContext& context);
 /// The same; where mesh hardening is found, and once more beside all effects, other teeth are tried.
 Hypothesis add_effects_or_teeth(const Hypothesis& h, const SearchContext& context);
 
-/// Hertzian teeth instead of mesh hardening, which teeth of another law than declared look like. Nothing
-/// where there is no hardening, or they do not leave clearly less.
+/// Hertzian teeth before a spring instead of linear ones, and of mesh hardening, which they look like.
+/// Nothing where they do not leave clearly less.
 std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context);
 
 /// With other values of the shapes that are chosen and not fitted, such as an exponent, where they leave

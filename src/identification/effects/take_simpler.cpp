@@ -24,14 +24,15 @@ Hypothesis take_simpler(const Hypothesis& before, const SearchContext& context) 
   for (std::size_t i = 0; i < h.effects.size(); ++i) {
     const Effect now = h.effects[i];
     for (std::size_t k = 0; k < now.alternatives.size(); ++k) {
-      if (unknowns_of(now.alternatives[k]) >= unknowns_of(now.candidate)) continue;
-      context.report("trying " + now.alternatives[k].id + " instead of " + now.candidate.id);
+      const Candidate& other = now.alternatives[k].candidate;
+      if (unknowns_of(other) >= unknowns_of(now.candidate)) continue;
+      context.report("trying " + other.id + " instead of " + now.candidate.id);
       std::vector<Effect> effects = h.effects;
-      std::swap(effects[i].candidate, effects[i].alternatives[k]);
+      std::swap(static_cast<Fitted&>(effects[i]), effects[i].alternatives[k]);
       auto with = refitted(h, std::move(effects), context);
       if (!with || size(*with) >= context.settings.revision.as_good * size(h)) continue;
       h = with_rejected(std::move(*with), now.candidate.id,
-                        now.alternatives[k].id + " explains the same and has fewer values");
+                        other.id + " explains the same and has fewer values");
       break;
     }
   }

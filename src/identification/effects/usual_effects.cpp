@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What every machine has some of, and no rig file states: how friction builds up after a reversal, a torque
-// whose zero is not quite zero, or whose constant is not quite the declared one, which shows as more or less
-// weight.
+// What every machine has some of, and no rig file states: how friction builds up after a reversal, what teeth
+// lose, a torque whose zero is not quite zero, or whose constant is not quite the declared one, which shows
+// as more or less weight.
 #include <cmath>
 
 #include "backlash_diagnosis/model/weight_term.h"
@@ -30,7 +30,7 @@ bool is_one_wave_per_turn(const Candidate& candidate) {
 bool is_usual(const Candidate& candidate, const model::Rig& rig) {
   const model::TermType& type = model::term_type(candidate.id);
   if (!type.search || candidate.terms.size() != 1) return false;
-  const double usual = type.usual_of_friction * rig.motor.coulomb_friction +
+  const double usual = type.usual_share + type.usual_of_friction * rig.motor.coulomb_friction +
                        type.usual_of_gap * rig.mesh.backlash / rig.mesh.lever() +
                        (is_one_wave_per_turn(candidate) ? type.usual_of_weight * declared_weight(rig) : 0);
   return std::fabs(candidate.terms.front().at(type.search->strength)) <= usual;

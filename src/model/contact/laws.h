@@ -9,6 +9,7 @@ namespace backlash::model {
 ContactLawType linear_contact();
 ContactLawType power_law_contact();
 ContactLawType hunt_crossley_contact();
+ContactLawType hertz_in_series_contact();
 ContactLawType kelvin_voigt_contact();
 ContactLawType herbert_mcwhannell_contact();
 ContactLawType yang_sun_contact();

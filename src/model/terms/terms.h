@@ -20,6 +20,7 @@ TermType learned_map_term();
 TermType load_dependent_friction_term();
 TermType local_fault_term();
 TermType mesh_hardening_term();
+TermType mesh_hysteresis_term();
 TermType position_dependent_friction_term();
 TermType quadratic_drag_term();
 TermType square_root_friction_term();

@@ -124,7 +124,7 @@ diagnosis:
 
 namespace {
 
-void make(std::uint64_t seed, const std::string& effect, double duration, double stamp_jitter,
+void make(std::uint64_t seed, const std::string& effect, bool own_teeth, double duration, double stamp_jitter,
           const std::filesystem::path& out) {
   Random machine_stream(seed, "machine");
   Machine machine = draw_machine(machine_stream);
@@ -133,7 +133,7 @@ void make(std::uint64_t seed, const std::string& effect, double duration, double
     if (std::find(ids.begin(), ids.end(), effect) == ids.end())
       throw std::invalid_argument(fmt::format("effect {} is none of {}", effect, fmt::join(ids, " ")));
     Random effect_stream(seed, "effect");
-    machine = with_effect(machine, effect, effect_stream);
+    machine = with_effect(machine, effect, own_teeth, effect_stream);
   }
   std::filesystem::create_directories(out);
   std::vector<std::pair<std::string, Run>> runs;
@@ -159,10 +159,13 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 1;
   double duration = 25, stamp_jitter = 0;
   std::string out, effect;
+  bool own_teeth = false;
   options.add_options()("help,h", "this text")("seed", po::value(&seed)->required(),
                                                "of the machine and its motions")(
       "effect", po::value(&effect),
       "one that the rig file does not know, on a joint with mild errors of its sensors")(
+      "own-teeth", po::bool_switch(&own_teeth),
+      "with --effect: teeth and friction as drawn, else the plainest")(
       "duration", po::value(&duration)->default_value(25), "of a record [s]")(
       "stamp-jitter", po::value(&stamp_jitter)->default_value(0),
       "of stamps alone: standard deviation, share of an interval")(
@@ -175,7 +178,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     po::notify(given);
-    robot_joints::make(seed, effect, duration, stamp_jitter, out);
+    robot_joints::make(seed, effect, own_teeth, duration, stamp_jitter, out);
     return 0;
   } catch (const po::error& error) {
     std::cerr << "make_robot_joint: " << error.what() << '\n';

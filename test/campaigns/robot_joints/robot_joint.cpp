@@ -248,8 +248,8 @@ const std::vector<std::string>& effect_ids() {
   return all;
 }
 
-Machine with_effect(Machine m, const std::string& id, Random& random) {
-  m.teeth = Teeth::linear, m.bristles = false;
+Machine with_effect(Machine m, const std::string& id, bool own_teeth, Random& random) {
+  if (!own_teeth) m.teeth = Teeth::linear, m.bristles = false;
   m.cogging = m.offset = m.ripple = m.eccentricity = m.interpolation = m.lag = m.skew = 0, m.gain = 1;
   m.declared.gravity = m.real.gravity = 0;
   m.rate = 500;

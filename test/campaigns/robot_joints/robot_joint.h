@@ -55,9 +55,10 @@ struct Machine {
 
 Machine draw_machine(Random& random);
 
-/// The same with linear teeth, Coulomb friction and mild errors of the sensors, and with an effect that its
-/// rig file does not know: one of effect_ids().
-Machine with_effect(Machine machine, const std::string& id, Random& random);
+/// The same with mild errors of the sensors, and with an effect that its rig file does not know: one of
+/// effect_ids(). `own_teeth`: with the teeth and the friction that it was drawn with, else with linear teeth
+/// and Coulomb friction.
+Machine with_effect(Machine machine, const std::string& id, bool own_teeth, Random& random);
 const std::vector<std::string>& effect_ids();
 
 struct Row {

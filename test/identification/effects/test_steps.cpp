@@ -128,7 +128,9 @@ TEST(WithoutEffect, LeavesTheOthersFitted) {
 
 TEST(TakeSimpler, TakesTheNameWithFewerUnknownsWhereThatExplainsTheSame) {
   Effect wave = cogging_effect(0.8, 1, 0.6);
-  wave.alternatives = {{"gravity", {{{"amplitude", 0.8}, {"phase", 0.6}}}}};
+  Gain other_channel;
+  other_channel.deflection = true;
+  wave.alternatives = {{{"gravity", {{{"amplitude", 0.8}, {"phase", 0.6}}}}, other_channel}};
   OneInertiaMachine weight;
   weight.extra = [](double q, double) { return 0.8 * std::sin(q + 0.6); };
   const SearchBench bench{weight};
@@ -137,7 +139,10 @@ TEST(TakeSimpler, TakesTheNameWithFewerUnknownsWhereThatExplainsTheSame) {
   const Hypothesis simpler = take_simpler(*start, bench.context);
   EXPECT_EQ(ids(simpler), std::vector<std::string>{"gravity"});
   ASSERT_EQ(simpler.effects[0].alternatives.size(), 1u);
-  EXPECT_EQ(simpler.effects[0].alternatives[0].id, "cogging");
+  EXPECT_EQ(simpler.effects[0].alternatives[0].candidate.id, "cogging");
+  // What is said of the one that was taken is its own, the channel that it explains among it.
+  EXPECT_TRUE(simpler.effects[0].gain.deflection);
+  EXPECT_FALSE(simpler.effects[0].alternatives[0].gain.deflection);
 
   wave.candidate = cogging_effect(0.8, 7, 0.6).candidate;
   const SearchBench teeth{with_cogging()};
@@ -156,7 +161,7 @@ TEST(TakeSimpler, ShapesThatAreNotFittedDoNotCount) {
   load.candidate.terms[0].set_choice("body", "motor");
   Candidate wave = {"position_dependent_friction", {{{"amplitude", 0.3}, {"order", 1}, {"phase", 0.6}}}};
   wave.terms[0].set_choice("body", "motor");
-  load.alternatives = {wave};
+  load.alternatives = {{wave, {}}};
   const SearchBench bench{with_cogging()};
   Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
   h.effects = {load};  // as if fitted: any fit that is tried would take its place
