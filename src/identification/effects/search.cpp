@@ -100,9 +100,14 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
     return result;
   }
   Hypothesis machine = result.declared;
-  if (const auto other = with_other_teeth(machine, context)) machine = *other;
-  if (const auto plain = plain_effects(machine, unseen, context)) {
-    result.found = *plain;
+  auto plain = plain_effects(machine, unseen, context);
+  if (!plain)  // where the teeth are not as declared, no effect is what it seems
+    if (auto other = with_other_teeth(machine, context)) {
+      machine = std::move(*other);
+      plain = plain_effects(machine, unseen, context);
+    }
+  if (plain) {
+    result.found = std::move(*plain);
     return result;
   }
   Hypothesis h = add_effects_or_teeth(machine, context);

@@ -183,7 +183,6 @@ std::vector<MapKind> kinds() {
       {"load", "mesh_torque", "N m", "N m", true, clear_torque, kAnyValue},
       {"load", "time", "s", "N m", true, clear_torque, kAnyValue},
       {"gap", "load_position", "rad", "rad", true, clear_angle, kAnyValue},
-      {"gap", "mesh_torque", "N m", "rad", true, clear_angle, kAnyValue},
       {"forward_flank", "load_position", "rad", "rad", true, clear_angle, kAnyValue},
       {"backward_flank", "load_position", "rad", "rad", true, clear_angle, kAnyValue},
       {"forward_stiffness", "load_position", "rad", "-", true, clear_stiffness, kSoftest},
