@@ -62,7 +62,9 @@ std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchCont
   context.report("trying other teeth");
   const auto fitted = attempted([&] { return fitted_with(*teeth, others, h, context); });
   const auto other = fitted ? *fitted : std::nullopt;
-  if (!other || size(*other) >= context.settings.revision.clearly_less * size(h)) return std::nullopt;
+  const RevisionSettings& revision = context.settings.revision;
+  const double most = others.size() < h.effects.size() ? revision.as_good : revision.clearly_less;
+  if (!other || size(*other) >= most * size(h)) return std::nullopt;
   Hypothesis result = *other;
   for (const Effect& effect : h.effects)
     if (stands_in_for_contact_law(effect.candidate.id))

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "backlash_diagnosis/base/interruption.h"
+#include "effect_roles.h"
 #include "steps.h"
 
 namespace backlash::identification {
@@ -81,6 +82,11 @@ std::optional<Hypothesis> plain_effects(Hypothesis& declared, const ServoData& u
   return found;
 }
 
+bool any_stands_in_for_teeth(const Hypothesis& h) {
+  return std::any_of(h.effects.begin(), h.effects.end(),
+                     [](const Effect& effect) { return stands_in_for_contact_law(effect.candidate.id); });
+}
+
 }  // namespace
 
 SearchResult search_effects(const model::Rig& declared, const std::vector<ServoData>& data,
@@ -107,7 +113,8 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
       plain = plain_effects(machine, unseen, context);
     }
   if (plain) {
-    result.found = std::move(*plain);
+    const auto other = any_stands_in_for_teeth(*plain) ? with_other_teeth(*plain, context) : std::nullopt;
+    result.found = other ? believe_all(*other, machine, unseen, context) : std::move(*plain);
     return result;
   }
   Hypothesis h = add_effects_or_teeth(machine, context);

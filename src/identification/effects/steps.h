@@ -28,7 +28,7 @@ Hypothesis add_effects(const Hypothesis& h, const SearchContext& context);
 Hypothesis add_effects_or_teeth(const Hypothesis& h, const SearchContext& context);
 
 /// Hertzian teeth before a spring instead of linear ones, and of mesh hardening, which they look like.
-/// Nothing where they do not leave clearly less.
+/// Nothing where they leave more than mesh hardening, or not clearly less where there is none.
 std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context);
 
 /// With other values of the shapes that are chosen and not fitted, such as an exponent, where they leave
