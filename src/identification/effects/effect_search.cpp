@@ -289,8 +289,7 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   describe_errors(result, on_test, records, settings.fit, trace);
   if (found.other_teeth)
     trace.notes.emplace_back(
-        "the teeth are Hertzian before a spring, not linear as declared (contact law hertz_in_series); so "
-        "they "
+        "the teeth are Hertzian before a spring (contact law hertz_in_series), not linear as declared: they "
         "are in the model, but nothing is called missing for it");
   note_shape_of_friction(
       found,

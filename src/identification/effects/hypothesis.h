@@ -20,13 +20,13 @@
 
 namespace backlash::identification {
 
-/// An effect that is in the model.
-/// With fitted values, and what it explains.
+/// What was fitted of an effect, and what it explains.
 struct Fitted {
   Candidate candidate;
   Gain gain;
 };
 
+/// An effect that is in the model.
 struct Effect : Fitted {
   std::vector<Fitted> alternatives;      // other effects that reach most of its gain, as fitted
   std::vector<std::string> nearest;      // of a learned map: named effects that explain part of the same
