@@ -194,7 +194,10 @@ std::vector<SearchedTerm> searched_terms(ShownIn channel, const MotionRange& ran
 }
 
 std::shared_ptr<const Term> term_of(const SearchedTerm& searched, double strength) {
-  ParameterValues values = completed(*searched.type, searched.given);
+  ParameterValues given = searched.given;
+  if (const auto shape = searched_shape(*searched.type); shape && !searched.shapes.empty())
+    given[shape->name] = searched.shapes.front();
+  ParameterValues values = completed(*searched.type, given);
   values[searched.type->search->strength] = strength;
   return make_term(searched.type->id, values);
 }

@@ -3,8 +3,7 @@
 // while it lets go,
 //   flank torque * (1 + h d' / (|d'| + v))        h [-], d' rate of the penetration, v [rad/s at the load]
 // v > 0 is the speed within which the difference turns; so the loss does not depend on the speed, unlike that
-// of a damper. All teeth have some per cent (0.5 to 2 % of involute steel: Niemann and Winter 1983,
-// Maschinenelemente II), strain wave gears more.
+// of a damper. All teeth have some per cent, as in the fit of the waveform; strain wave gears have more.
 #include <cmath>
 
 #include "search_values.h"
@@ -29,7 +28,7 @@ double clear_share(const MotionRange&) {
   return 0.1;
 }
 
-/// Choice: flanks close a hundred times as slowly as the joint moves.
+/// Where a fit begins; choice: flanks close a hundred times as slowly as the joint moves.
 std::vector<double> closing_speeds(const MotionRange& range) {
   return {0.01 * range.speed};
 }
@@ -43,8 +42,8 @@ TermType mesh_hysteresis_term() {
                 [](const ParameterValues& p) -> std::unique_ptr<Term> {
                   return std::make_unique<MeshHysteresis>(p.at("share"), p.at("speed"));
                 },
-                TermSearch{"share", "", clear_share, {{"speed", closing_speeds, false}}}};
-  type.usual_share = 0.15;  // choice: strain wave gears lose as much
+                TermSearch{"share", "", clear_share, {{"speed", closing_speeds, true}}}};
+  type.usual_share = 0.15;  // choice: what even a strain wave gear may lose
   return type;
 }
 

@@ -143,6 +143,28 @@ TEST(EffectSearch, TeethOfAnotherShapeAreNoEffect) {
   EXPECT_EQ(trace.base.mesh.contact_spec().law, "linear");
 }
 
+TEST(EffectSearch, TeethOfAnotherShapeAloneAreNoHardening) {
+  const Trace trace = traced(records_of(hertzian_servo()));
+  EXPECT_EQ(found(trace), std::set<std::string>{});
+  EXPECT_EQ(trace.augmented.mesh.contact_spec().law, "hertz_in_series");
+  expect_at_floor(trace);
+}
+
+// All teeth lose some per cent; 15 % is more than usual.
+TEST(EffectSearch, WhatTeethLoseIsNamedWhereItIsUnusual) {
+  for (const double share : {0.1, 0.3}) {
+    model::Rig machine = test::other_servo();
+    machine.terms.push_back(model::make_term("mesh_hysteresis", {{"share", share}, {"speed", 1e-3}}));
+    const Trace trace = traced(records_of(machine));
+    EXPECT_EQ(found(trace), share < 0.15 ? std::set<std::string>{} : std::set<std::string>{"mesh_hysteresis"})
+        << share;
+    ASSERT_FALSE(trace.augmented.terms.empty()) << share;
+    EXPECT_EQ(trace.augmented.terms.back()->id, "mesh_hysteresis") << share;
+    // The shape at small speeds is not resolved by the sampling: a twentieth.
+    EXPECT_NEAR(trace.augmented.terms.back()->values.at("share"), share, 0.05 * share);
+  }
+}
+
 TEST(EffectSearch, TwoEffectsAtOnce) {
   model::Rig machine = test::other_servo();
   machine.terms.push_back(model::make_term("cogging", {{"amplitude", 14}, {"order", 23}, {"phase", 0.7}}));

@@ -193,7 +193,7 @@ TEST(OtherTeeth, AreAsStiffAndDampedUnderTheSameTorque) {
   EXPECT_FALSE(with_hertzian_teeth(*other, 200));  // they are already
 }
 
-TEST(OtherTeeth, AreNotTriedWithoutHardening) {
+TEST(OtherTeeth, AreNotTriedOfOneInertiaWhichHasNone) {
   const SearchBench bench{with_cogging()};
   const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
   const auto with = refitted(h, {cogging_effect(0.8, 7, 0.6)}, bench.context);
