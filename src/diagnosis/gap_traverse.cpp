@@ -53,8 +53,8 @@ void require(bool valid, const char* name, double value, const char* limit) {
 void check(const GapTraverseSettings& s) {
   require(s.motor_inertia > 0, "motor_inertia", s.motor_inertia, "must be > 0");
   require(s.load_inertia > 0, "load_inertia", s.load_inertia, "must be > 0");
-  require(s.stiffness > 0, "stiffness", s.stiffness, "must be > 0");
-  require(s.damping > 0, "damping", s.damping, "must be > 0");
+  require(s.flank_under || s.stiffness > 0, "stiffness", s.flank_under ? 0 : s.stiffness, "must be > 0");
+  require(s.flank_under || s.damping > 0, "damping", s.flank_under ? 0 : s.damping, "must be > 0");
   require(s.motor_damping >= 0, "motor_damping", s.motor_damping, "must be >= 0");
   require(s.motor_friction >= 0, "motor_friction", s.motor_friction, "must be >= 0");
   require(s.load_damping >= 0, "load_damping", s.load_damping, "must be >= 0");
@@ -175,9 +175,29 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
                           data.load.empty() ? "torque" : "deflection");
 }
 
+/// What `make` reads of the record, with the teeth as they are under the usual torque: that of the motor at
+/// first, then the one through the teeth.
+template <typename Make>
+TraverseData with_teeth(GapTraverseSettings& s, const record::Record& record, const Make& make) {
+  const auto press = [&](double torque) {
+    if (!(torque > 0)) throw Refusal{Status::insufficient_data, "the motor has no torque"};
+    const GapTraverseSettings::Flank flank = s.flank_under(torque);
+    s.stiffness = flank.stiffness, s.damping = flank.damping;
+  };
+  if (!s.flank_under) return make(s);
+  if (!record.has(record::Channel::motor_torque))
+    throw Refusal{Status::insufficient_data, "needs motor_torque, as the declared teeth are no spring"};
+  std::vector<double> sizes;
+  for (const double torque : record.column(record::Channel::motor_torque)) sizes.push_back(std::fabs(torque));
+  press(signal::median(std::move(sizes)));
+  press(make(s).level);
+  return make(s);
+}
+
 /// Load driven by the recorded motor, against its own encoder.
-void by_load(Estimate& e, const record::Record& record, const GapTraverseSettings& s) {
-  TraverseData data = traverse_data_by_load(record, s);
+void by_load(Estimate& e, const record::Record& record, GapTraverseSettings s) {
+  TraverseData data =
+      with_teeth(s, record, [&](const auto& it) { return traverse_data_by_load(record, it); });
   std::vector<TraverseWindow> wide,
       narrow;  // where both flanks are seen, and others, which show what the encoders err
   for (const TraverseWindow& window : data.windows)
@@ -244,8 +264,8 @@ std::vector<double> orders_of_waves(const TraverseFit& fit, const TraverseData& 
 
 /// By the motor alone: torque that moves the load, in windows that begin in contact. The motor that the
 /// surest of them give finds more of them.
-void by_motor(Estimate& e, const record::Record& record, const GapTraverseSettings& s) {
-  const TraverseData first = first_data(record, s);
+void by_motor(Estimate& e, const record::Record& record, GapTraverseSettings s) {
+  const TraverseData first = with_teeth(s, record, [&](const auto& it) { return first_data(record, it); });
   require_crossings(first, kFewestFirst);
   std::vector<double> starts;
   for (const double factor : kGapFactors)

@@ -20,6 +20,7 @@ namespace {
 
 constexpr double kFreeElastic = 0.67;  // theory: of the deflection, of teeth 40 % softer than declared
 constexpr double kNormal95 = 1.96;     // standard deviations of 95 %, both ends: theory
+constexpr double kLittle = 1e-2;       // 1/s, of a deflection: a slope of its damping, above rounding
 
 /// Where the file does not say how well it knows the elastic deflection that lost_motion subtracts. A mesh of
 /// angles is one spring with all that is merged into it, of the stated uncertainty.
@@ -90,11 +91,18 @@ std::function<double(double)> declared_load(const std::shared_ptr<const model::G
   };
 }
 
+/// Teeth of any law about the deflection under a torque, at the axis of motor_position.
+diagnosis::GapTraverseSettings::Flank flank_under(const model::ContactLaw& law, double lever, double torque) {
+  const double force = torque / lever, depth = law.static_penetration(force);
+  const double rate = kLittle * depth;  // m/s, slow: of laws whose damping is no line as well
+  return {force / depth * lever * lever, (law.force(depth, rate, 0) - force) / rate * lever * lever};
+}
+
 /// The same, with its values at the axis of motor_position.
 std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
     const model::Rig& rig, const std::shared_ptr<const model::GearTrain>& train) {
   if (rig.link_locked || !rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.linear ||
-      rig.coupled || rig.mesh.variation || rig.mesh.pairs || rig.mesh.contact_spec().law != "linear")
+      rig.coupled || rig.mesh.variation || rig.mesh.pairs || rig.mesh.contact->needs_impact_speed())
     return std::nullopt;
   const double ratio = rig.motor_axis_ratio(), lever = rig.mesh.lever() / ratio;
   diagnosis::GapTraverseSettings s;
@@ -104,8 +112,12 @@ std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
   s.motor_friction = rig.motor.coulomb_friction;
   s.load_friction = rig.link.coulomb_friction / ratio;
   s.load_damping = rig.link.viscous_damping / (ratio * ratio);
-  s.stiffness = rig.mesh.contact_spec().values.at("stiffness") * lever * lever;
-  s.damping = rig.mesh.contact_spec().values.at("damping") * lever * lever;
+  const auto flank = [law = rig.mesh.contact, lever](double torque) {
+    return flank_under(*law, lever, torque);
+  };
+  const auto under_one = flank(1);  // N m
+  s.stiffness = under_one.stiffness, s.damping = under_one.damping;
+  if (rig.mesh.contact_spec().law != "linear") s.flank_under = flank;
   s.gap = rig.backlash_angle(rig.mesh.backlash);
   s.motor_turn = 2 * M_PI / (rig.motor_side ? 1 : rig.reduction_ratio);
   if (!rig.mesh.angular()) s.base_radius = 1 / rig.backlash_angle(1);

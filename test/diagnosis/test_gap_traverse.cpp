@@ -213,6 +213,26 @@ TEST(GapTraverse, HoldsForTeethAfterHertz) {
   }
 }
 
+// Declared as they are: they count as what they are under the torque of the record.
+TEST(GapTraverse, TeethThatAreNoSpringMayBeDeclared) {
+  Servo servo;
+  servo.hertz = 300;
+  GapTraverseSettings s = declared();
+  s.stiffness = s.damping = kNaN;
+  s.flank_under = [&](double torque) {
+    const double there = servo.exponent * servo.hertz / servo.stiffness;
+    return GapTraverseSettings::Flank{torque / (there * std::pow(torque / servo.hertz, 1 / servo.exponent)),
+                                      torque * servo.damping / servo.hertz};
+  };
+  for (const double load_step : {0.0, 7e-6}) {
+    servo.load_step = load_step;
+    expect_gap(servo, estimate_gap_traverse(servo.record(), s));
+  }
+  record::Record without = servo.record();
+  without.column(record::Channel::motor_torque).clear();
+  EXPECT_NE(estimate_gap_traverse(without, s).message.find("needs motor_torque"), std::string::npos);
+}
+
 // Teeth that begin more softly than Hertz's, as those that harden, look like a wider gap: the interval holds
 // both.
 TEST(GapTraverse, HoldsForTeethSofterAtFirstThanAnyContact) {

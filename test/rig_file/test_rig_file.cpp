@@ -134,6 +134,22 @@ TEST(RigFile, MotorSideAxisScalesBaseRadiusAndDeflection) {
               1e-15);
 }
 
+// Hertz's contact in series with a spring, F = T / r: d = F / Ks + (F / K)^(2/3), and a damper.
+TEST(RigFile, GapTraverseKnowsTeethThatAreNoSpringUnderATorque) {
+  const RigFile file =
+      load(replaced(kTwoInertias, "law: linear, stiffness: 1.0e7, damping: 10",
+                    "law: hertz_in_series, stiffness: 2.0e9, series_stiffness: 1.0e7, damping: 10"));
+  ASSERT_TRUE(file.diagnosis.gap_traverse && file.diagnosis.gap_traverse->flank_under);
+  for (const double torque : {0.1, 5.0}) {
+    const double radius = 0.02, force = torque / radius;
+    const double depth = force / 1e7 + std::pow(force / 2e9, 2.0 / 3);
+    const auto flank = file.diagnosis.gap_traverse->flank_under(torque);
+    EXPECT_NEAR(flank.stiffness, torque / (depth / radius), 1e-9 * flank.stiffness);
+    EXPECT_NEAR(flank.damping, 10 * radius * radius, 1e-6 * flank.damping);  // of a difference
+  }
+  EXPECT_FALSE(load(kTwoInertias).diagnosis.gap_traverse->flank_under);
+}
+
 // Four mistakes in three parts of the file.
 TEST(RigFile, AllMistakesAtOnce) {
   std::string text = replaced(kTwoInertias, "motor: {inertia: 1.0e-3}", "motor: {inertai: 1.0e-3}");

@@ -70,9 +70,14 @@ struct GapTraverseSettings {
   double load_damping = 0;                           ///< N m s/rad, >= 0
   double motor_friction = 0, load_friction = 0;      ///< N m, >= 0, dry
   double stiffness = kNaN, damping = kNaN;           ///< N m/rad, N m s/rad, > 0, of the flanks
-  double gap = 0;                                    ///< rad, >= 0: where the fit begins, with any error
-  double motor_turn = 2 * M_PI;                      ///< rad of motor_position in a turn of the motor, > 0
-  double base_radius = kNaN;                         ///< m, > 0; NaN: Estimate::backlash is NaN
+  /// Of teeth that are no spring: both under a torque [N m], > 0, for T0 of the record; empty: a spring.
+  struct Flank {
+    double stiffness, damping;
+  };
+  std::function<Flank(double torque)> flank_under;
+  double gap = 0;                ///< rad, >= 0: where the fit begins, with any error
+  double motor_turn = 2 * M_PI;  ///< rad of motor_position in a turn of the motor, > 0
+  double base_radius = kNaN;     ///< m, > 0; NaN: Estimate::backlash is NaN
   /// rad, >= 0, rms of what the commissioned machine left of motor minus load position beyond noise; NaN: the
   /// machine was not commissioned with both encoders.
   double unexplained = kNaN;
