@@ -41,9 +41,8 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
   const Left other_was = left(before, !deflection, settings), other_is = left(after, !deflection, settings);
   const TestGain other = test_gain(other_was, other_is, settings);
   const double price = (other_is.total() - other_was.total()) / other_was.noise;
-  const bool at_noise = other_is.total() < settings.at_noise * settings.at_noise * other_is.noise;
-  const bool dear = map || !at_noise || price > settings.price * decrease / was.noise;
-  if (other.upper < 0 && (other.value < -settings.much_worse || (other.value < -settings.worse && dear)))
+  const bool dear = map || price > settings.price * decrease / was.noise;
+  if (other.upper < 0 && other.value < -settings.worse && dear)
     return fmt::format("on the unseen record it makes the error of {} worse, by {}", names[!deflection],
                        interval({-other.value, -other.upper, -other.lower}));
   return "";
@@ -93,9 +92,7 @@ std::string other_in_a_part(const StrengthInParts& parts, std::size_t effect) {
 std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis& h, const ServoData& unseen,
                                                                 const SearchContext& context) {
   const BeliefSettings& settings = context.settings.belief;
-  const auto belongs_to_machine = [&](std::size_t i) {
-    return is_usual(h.effects[i].candidate, h.declared->rig);
-  };
+  const auto belongs_to_machine = [&](std::size_t i) { return is_usual(h.effects[i].candidate, h); };
   const auto all = strengths(h, context);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (!belongs_to_machine(i) && is_vague(all[i], settings.least_z))
@@ -123,7 +120,7 @@ bool last_is_vague(const Hypothesis& h, const SearchContext& context) {
 std::string contradicted_by_unseen(const Hypothesis& h, const SearchContext& context) {
   const FitSettings& fit = context.settings.fit;
   const Effect& last = h.effects.back();
-  if (is_usual(last.candidate, h.declared->rig)) return "";
+  if (is_usual(last.candidate, h)) return "";
   const Machine& before = h.effects.size() > 1 ? *h.effects.end()[-2].after : h.base->fit.machine;
   return contradicted(predicted(before, context.unseen, fit), predicted(*last.after, context.unseen, fit),
                       last.gain.deflection, is_learned(last.candidate.id), context.settings.belief);

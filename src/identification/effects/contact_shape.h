@@ -3,15 +3,15 @@
 // missing effects.
 #pragma once
 
-#include <optional>
+#include <vector>
 
 #include "backlash_diagnosis/model/rig.h"
 
 namespace backlash::identification {
 
-/// The same rig with Hertzian teeth before a spring, as stiff and damped as before under `torque` [N m] on
-/// the mesh: a start for fits, which find how much of the deflection is whose. Nothing where its law is not
-/// `linear`.
-std::optional<model::Rig> with_hertzian_teeth(const model::Rig& rig, double torque);
+/// The same rig with Hertzian teeth, as stiff and damped as before under `torque` [N m] on the mesh: starts
+/// for fits. Before a spring with a damper, where they find how much of the deflection is whose, and damped
+/// as Hunt and Crossley have it. None where its law is not `linear`.
+std::vector<model::Rig> with_hertzian_teeth(const model::Rig& rig, double torque);
 
 }  // namespace backlash::identification

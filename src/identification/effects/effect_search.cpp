@@ -62,7 +62,7 @@ void note_usual_effects(const Hypothesis& h, Trace& trace) {
   for (const Effect& effect : h.effects) {
     const auto at = std::find_if(trace.steps.begin(), trace.steps.end(),
                                  [&](const FoundEffect& e) { return e.id == effect.candidate.id; });
-    if (at == trace.steps.end() || !is_usual(effect.candidate, h.declared->rig)) continue;
+    if (at == trace.steps.end() || !is_usual(effect.candidate, h)) continue;
     note_instead(at,
                  described(*at, trace.augmented) +
                      ": in the model but not called missing, as every machine has as much",
@@ -288,9 +288,10 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   describe_machine(result, on_test, settings, trace);
   describe_errors(result, on_test, records, settings.fit, trace);
   if (found.other_teeth)
-    trace.notes.emplace_back(
-        "the teeth are Hertzian before a spring (contact law hertz_in_series), not linear as declared: they "
-        "are in the model, but nothing is called missing for it");
+    trace.notes.push_back(
+        fmt::format("the teeth are Hertzian (contact law {}), not linear as declared: they are in the model, "
+                    "but nothing is called missing for it",
+                    trace.augmented.mesh.contact_spec().law));
   note_shape_of_friction(
       found,
       simulation::load_moves_freely(declared) ? settings.shape_of_friction : settings.shape_of_all_torque,

@@ -51,20 +51,59 @@ std::optional<Hypothesis> fitted_with(const model::Rig& teeth, const std::vector
   return other;
 }
 
+/// The law of those that leave least.
+std::optional<Hypothesis> best_of(const std::vector<model::Rig>& laws, const std::vector<Effect>& effects,
+                                  const Hypothesis& h, const SearchContext& context) {
+  std::optional<Hypothesis> best;
+  for (const model::Rig& teeth : laws) {
+    auto with = attempted([&] { return fitted_with(teeth, effects, h, context); });
+    if (with && *with && (!best || size(**with) < size(*best))) best = std::move(*with);
+  }
+  return best;
+}
+
+/// Effects of the teeth, each as the last of the shapes that are sought has it (of exponents the largest).
+std::vector<Candidate> effects_of_teeth(const model::MotionRange& range) {
+  std::vector<Candidate> all;
+  for (const model::TermType& type : model::term_types()) {
+    const auto is_chosen = [](const ParameterSpec& spec) { return !spec.choices.empty(); };
+    if (!type.search || !type.search->phase.empty() ||
+        std::any_of(type.parameters.begin(), type.parameters.end(), is_chosen))
+      continue;  // of a body or a position
+    ParameterValues values;
+    values[type.search->strength] = type.search->typical(range);
+    for (const model::TermShape& shape : type.search->shapes) values[shape.name] = shape.values(range).back();
+    if (model::make_term(type.id, values)->loads_flanks()) all.push_back({type.id, {values}});
+  }
+  return all;
+}
+
+/// Whether linear teeth with an effect leave less: such as harden by a power, as cubic ones, or lose.
+bool rather_linear(const Hypothesis& other, const Hypothesis& h, const SearchContext& context) {
+  for (const Candidate& candidate : effects_of_teeth(context.range)) {
+    std::vector<Effect> effects = h.effects;
+    effects.emplace_back().candidate = candidate;
+    const auto with = attempted([&] { return refitted(h, std::move(effects), context); });
+    if (with && *with && size(**with) < size(other)) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context) {
   const std::vector<Effect> others = without_stand_ins_for_teeth(h.effects);
   if (clearly_right(misfit(h), context)) return std::nullopt;
   // Of the machine without hardening, which has a stiffness of its own.
-  const auto teeth = with_hertzian_teeth(h.base->fit.machine.rig, context.range.torque);
-  if (!teeth) return std::nullopt;
+  const auto laws = with_hertzian_teeth(h.base->fit.machine.rig, context.range.torque);
+  if (laws.empty()) return std::nullopt;
   context.report("trying other teeth");
-  const auto fitted = attempted([&] { return fitted_with(*teeth, others, h, context); });
-  const auto other = fitted ? *fitted : std::nullopt;
+  const auto other = best_of(laws, others, h, context);
   const RevisionSettings& revision = context.settings.revision;
-  const double most = others.size() < h.effects.size() ? revision.as_good : revision.clearly_less;
-  if (!other || size(*other) >= most * size(h)) return std::nullopt;
+  const bool harden = others.size() < h.effects.size();
+  if (!other || size(*other) >= (harden ? revision.as_good : revision.clearly_less) * size(h))
+    return std::nullopt;
+  if (!harden && rather_linear(*other, h, context)) return std::nullopt;
   Hypothesis result = *other;
   for (const Effect& effect : h.effects)
     if (stands_in_for_contact_law(effect.candidate.id))

@@ -117,7 +117,7 @@ std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain
     const Plain& first = *std::find_if(plain.begin(), plain.end(), [&](const Plain& other) {
       return other.explained.deflection == p.explained.deflection;
     });
-    const bool usual = is_usual(first.candidate, h.declared->rig);
+    const bool usual = is_usual(first.candidate, h);
     const bool alike = p.explained.gain_held_out >= settings.revision.alike * first.explained.gain_held_out;
     if (p.candidate.id != first.candidate.id && (usual || !alike)) continue;
     if (auto with = with_effect(h, effect_of(p, plain, settings), context))

@@ -82,6 +82,34 @@ std::optional<Hypothesis> plain_effects(Hypothesis& declared, const ServoData& u
   return found;
 }
 
+/// Friction that is held at zero was negative because something else is missing, and would keep that from
+/// being found.
+Hypothesis with_free_friction(const Hypothesis& h, const Hypothesis& declared, const SearchContext& context) {
+  if (h.held.empty() || h.other_teeth != declared.other_teeth) return h;
+  Hypothesis free = h;
+  free.declared = declared.declared;
+  free.held.clear();
+  auto fitted = refitted(free, h.effects, context);
+  return fitted ? *fitted : h;
+}
+
+/// Beside plain effects what no sum of torques shows: effects about a standstill, a delay, and other teeth.
+Hypothesis with_hidden_effects(const Hypothesis& plain, const Hypothesis& declared, const ServoData& unseen,
+                               const SearchContext& context) {
+  SearchContext of_torque = context;
+  of_torque.settings.trials.of_torque_alone = true;
+  const Hypothesis more = add_effects_or_teeth(with_free_friction(plain, declared, context), of_torque);
+  if (more.effects.size() > plain.effects.size() || more.other_teeth != plain.other_teeth) {
+    Hypothesis believed = believe_all(more, declared, unseen, context);
+    const bool teeth = believed.effects.size() == plain.effects.size() &&
+                       size(believed) < context.settings.revision.clearly_less * size(plain);
+    if (teeth || believed.effects.size() > plain.effects.size()) return believed;
+  }
+  Hypothesis h = plain;
+  h.rejected = more.rejected;
+  return h;
+}
+
 bool any_stands_in_for_teeth(const Hypothesis& h) {
   return std::any_of(h.effects.begin(), h.effects.end(),
                      [](const Effect& effect) { return stands_in_for_contact_law(effect.candidate.id); });
@@ -114,7 +142,8 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
     }
   if (plain) {
     const auto other = any_stands_in_for_teeth(*plain) ? with_other_teeth(*plain, context) : std::nullopt;
-    result.found = other ? believe_all(*other, machine, unseen, context) : std::move(*plain);
+    result.found = with_hidden_effects(
+        other ? believe_all(*other, machine, unseen, context) : std::move(*plain), machine, unseen, context);
     return result;
   }
   Hypothesis h = add_effects_or_teeth(machine, context);

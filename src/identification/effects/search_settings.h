@@ -29,6 +29,7 @@ struct TrialSettings {
       0.3;  // simulation: of the gain that is asked for; sensitivities mislead by so much
   double tie =
       0.005;  // choice: of the residuals: then the term with the fewest shapes, gravity before cogging
+  bool of_torque_alone = false;  // what the pressed flanks show has been looked at
 };
 
 /// When an effect is believed (least gains: TraceSettings).
@@ -75,13 +76,10 @@ struct BeliefSettings {
   double risk = 0.05;              // choice: beyond both ends of an interval
   double least_part = 0.1;         // choice: of what lies above the noise, that an effect must explain
   double least_part_of_map = 0.5;  // choice: the same, of a map, which can take any shape
-  double worse = 0.05;             // choice: of the other channel's error
-  // A channel that is left with little but noise may get worse by a part of what the other gains, each in its
-  // noise: the fit weighs both.
-  double at_noise = 1.3;     // simulation: times the noise
-  double price = 0.1;        // choice
-  double much_worse = 0.15;  // choice: of the other channel's error, at no price
-  double least_z = 4;        // choice: of a strength, standard errors
+  // Of the other channel's error; by more it may get worse by a part of what this one gains, each in its
+  // noise: the fit weighs both. Choices.
+  double worse = 0.05, price = 0.1;
+  double least_z = 4;  // choice: of a strength, standard errors
   // Where more is left than so many times the noise: of a strength, in a part of the records that holds this
   // share of what the effect does, and shows it within this error: as far off, by so many standard errors, is
   // another effect. Choices.

@@ -14,7 +14,7 @@ Hypothesis fit_declared(const model::Rig& declared, const SearchContext& context
 std::vector<FitParameter> declared_parameters(const model::Rig& rig);
 
 /// Whether every machine has as much of it (model/term.h).
-bool is_usual(const Candidate& candidate, const model::Rig& rig);
+bool is_usual(const Candidate& candidate, const Hypothesis& h);
 
 /// One more named effect, that which two encoders show plainly to explain most; none of a machine with one.
 Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context);

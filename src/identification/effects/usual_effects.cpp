@@ -27,12 +27,15 @@ bool is_one_wave_per_turn(const Candidate& candidate) {
 
 }  // namespace
 
-bool is_usual(const Candidate& candidate, const model::Rig& rig) {
+/// Of the machine as it is found; of the weight as it is declared, as a found one is an effect.
+bool is_usual(const Candidate& candidate, const Hypothesis& h) {
+  const model::Rig& rig = h.fitted->fit.machine.rig;
   const model::TermType& type = model::term_type(candidate.id);
   if (!type.search || candidate.terms.size() != 1) return false;
-  const double usual = type.usual_share + type.usual_of_friction * rig.motor.coulomb_friction +
-                       type.usual_of_gap * rig.mesh.backlash / rig.mesh.lever() +
-                       (is_one_wave_per_turn(candidate) ? type.usual_of_weight * declared_weight(rig) : 0);
+  const double usual =
+      type.usual_share + type.usual_of_friction * std::fmax(0, rig.motor.coulomb_friction) +
+      type.usual_of_gap * rig.mesh.backlash / rig.mesh.lever() +
+      (is_one_wave_per_turn(candidate) ? type.usual_of_weight * declared_weight(h.declared->rig) : 0);
   return std::fabs(candidate.terms.front().at(type.search->strength)) <= usual;
 }
 

@@ -133,31 +133,32 @@ double most_left(const OutputError& fit) {
   return most;
 }
 
-/// The machine with the same values and Hertzian teeth, fitted; nothing where they leave more, or where that
-/// fails, which is said.
+/// The machine with the same values and Hertzian teeth that leave least, fitted; nothing where they leave
+/// more, or where that fails, which is said.
 std::optional<OutputError> with_hertzian_fit(const OutputError& fit, const std::vector<ServoData>& data,
                                              OutputErrorSettings settings,
                                              std::vector<std::string>& warnings) {
   double torque = 0;  // N m, standard deviation
   for (const ServoData& d : data) torque = std::max(torque, spread(d.torque) / std::sqrt(double(d.size())));
-  const auto teeth = with_hertzian_teeth(fit.rig, torque);
-  if (!teeth) return std::nullopt;
+  std::optional<OutputError> best;
   settings.findings.clear();
-  settings.parameters.clear();
-  for (const rig_file::RigParameter& p : rig_file::servo_parameters())
-    if (p.known_to(*teeth) && (!p.contact.empty() || fit.parameters.count(p.name) > 0))
-      settings.parameters.push_back(p.name);
-  try {
-    OutputError other = fit_output_error(*teeth, data, settings);
-    if (most_left(other) < most_left(fit)) return other;
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const Error& error) {  // values that no machine has, or with which the load runs away
-    warnings.push_back(
-        std::string("no Hertzian teeth can be fitted, so that the errors are those of linear ones: ") +
-        error.what());
+  for (const model::Rig& teeth : with_hertzian_teeth(fit.rig, torque)) {
+    settings.parameters.clear();
+    for (const rig_file::RigParameter& p : rig_file::servo_parameters())
+      if (p.known_to(teeth) && (!p.contact.empty() || fit.parameters.count(p.name) > 0))
+        settings.parameters.push_back(p.name);
+    try {
+      OutputError other = fit_output_error(teeth, data, settings);
+      if (most_left(other) < most_left(best ? *best : fit)) best = std::move(other);
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error& error) {  // values that no machine has, or with which the load runs away
+      warnings.push_back(
+          fmt::format("no Hertzian teeth ({}) can be fitted, so that the errors are those without them: {}",
+                      teeth.mesh.contact_spec().law, error.what()));
+    }
   }
-  return std::nullopt;
+  return best;
 }
 
 /// Where teeth of another law leave less, no value is known better than by the difference between the laws.
