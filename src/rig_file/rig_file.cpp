@@ -112,12 +112,16 @@ std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
   s.motor_friction = rig.motor.coulomb_friction;
   s.load_friction = rig.link.coulomb_friction / ratio;
   s.load_damping = rig.link.viscous_damping / (ratio * ratio);
-  const auto flank = [law = rig.mesh.contact, lever](double torque) {
-    return flank_under(*law, lever, torque);
-  };
-  const auto under_one = flank(1);  // N m
-  s.stiffness = under_one.stiffness, s.damping = under_one.damping;
-  if (rig.mesh.contact_spec().law != "linear") s.flank_under = flank;
+  if (const ParameterValues& values = rig.mesh.contact_spec().values;
+      rig.mesh.contact_spec().law == "linear") {
+    s.stiffness = values.at("stiffness") * lever * lever, s.damping = values.at("damping") * lever * lever;
+  } else {
+    s.flank_under = [law = rig.mesh.contact, lever](double torque) {
+      return flank_under(*law, lever, torque);
+    };
+    const auto under_one = s.flank_under(1);  // N m: whether it has both
+    s.stiffness = under_one.stiffness, s.damping = under_one.damping;
+  }
   s.gap = rig.backlash_angle(rig.mesh.backlash);
   s.motor_turn = 2 * M_PI / (rig.motor_side ? 1 : rig.reduction_ratio);
   if (!rig.mesh.angular()) s.base_radius = 1 / rig.backlash_angle(1);
