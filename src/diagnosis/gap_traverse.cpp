@@ -143,7 +143,7 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
                   fmt::format("no machine like that of the rig file explains the {}: {:.0f} % of it are left",
                               data.load.empty() ? "torque" : "motor's position less the load's", 100 * left)};
   const double tried = std::isnan(s.unexplained) ? HUGE_VAL : kLawOfLeft * s.unexplained;  // rad
-  const double model = data.load.empty() ? kModel : std::min(kModelByLoad, tried / gap);
+  const double model = data.load.empty() ? kModel : kModelByLoad;
   double lower = gap, upper = gap;
   for (const TraverseFit& fit : fits) {
     const double half = std::hypot(

@@ -44,9 +44,8 @@
 // the channel that is left beyond noise, and a fifth of the deflection of a flank under T0 for laws of teeth
 // that are none of these, and five times what the joint moves while the times of the samples are not known
 // (record/even_grid.h). Of a commissioned machine (GapTraverseSettings::unexplained) its law was tried: in
-// place of the fifth stands 9.2 times the rms of what the commissioning left beyond noise where that is less,
-// and with the load's encoder in place of the 4 % too, as that rms holds what the encoders err. Counted on
-// joints of test/campaigns/robot_joints that were drawn afterwards (doc/reference/estimators.md).
+// place of the fifth stands 9.2 times the rms of what the commissioning left beyond noise where that is less.
+// Counted on joints of test/campaigns/robot_joints that were drawn afterwards (doc/evidence/gap_traverse.md).
 //
 // Needs motor_position, and load_position or motor_torque. Samples are put on an even grid
 // (record/even_grid.h), of at least two samples in a cycle of the motor against the load, four by the motor
