@@ -93,6 +93,13 @@ Hypothesis with_free_friction(const Hypothesis& h, const Hypothesis& declared, c
   return fitted ? *fitted : h;
 }
 
+/// Of the square that a channel has above its noise; what takes less may stand in for something else.
+bool takes_half(const Misfit& before, const Misfit& after, double half) {
+  const auto above = [](double misfit) { return std::max(0.0, misfit * misfit - 1); };
+  return above(after.torque) < half * above(before.torque) ||
+         above(after.deflection) < half * above(before.deflection);
+}
+
 /// Beside plain effects what no sum of torques shows: effects about a standstill, a delay, and other teeth.
 Hypothesis with_hidden_effects(const Hypothesis& plain, const Hypothesis& declared, const ServoData& unseen,
                                const SearchContext& context) {
@@ -103,7 +110,9 @@ Hypothesis with_hidden_effects(const Hypothesis& plain, const Hypothesis& declar
     Hypothesis believed = believe_all(more, declared, unseen, context);
     const bool teeth = believed.effects.size() == plain.effects.size() &&
                        size(believed) < context.settings.revision.clearly_less * size(plain);
-    if (teeth || believed.effects.size() > plain.effects.size()) return believed;
+    const bool effects = believed.effects.size() > plain.effects.size() &&
+                         takes_half(misfit(plain), misfit(believed), context.settings.revision.half);
+    if (teeth || effects) return believed;
   }
   Hypothesis h = plain;
   h.rejected = more.rejected;
