@@ -53,8 +53,10 @@ void require(bool valid, const char* name, double value, const char* limit) {
 void check(const GapTraverseSettings& s) {
   require(s.motor_inertia > 0, "motor_inertia", s.motor_inertia, "must be > 0");
   require(s.load_inertia > 0, "load_inertia", s.load_inertia, "must be > 0");
-  require(s.flank_under || s.stiffness > 0, "stiffness", s.flank_under ? 0 : s.stiffness, "must be > 0");
-  require(s.flank_under || s.damping > 0, "damping", s.flank_under ? 0 : s.damping, "must be > 0");
+  if (!s.flank_under) {
+    require(s.stiffness > 0, "stiffness", s.stiffness, "must be > 0");
+    require(s.damping > 0, "damping", s.damping, "must be > 0");
+  }
   require(s.motor_damping >= 0, "motor_damping", s.motor_damping, "must be >= 0");
   require(s.motor_friction >= 0, "motor_friction", s.motor_friction, "must be >= 0");
   require(s.load_damping >= 0, "load_damping", s.load_damping, "must be >= 0");
@@ -180,16 +182,16 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
 template <typename Make>
 TraverseData with_teeth(GapTraverseSettings& s, const record::Record& record, const Make& make) {
   const auto press = [&](double torque) {
-    if (!(torque > 0)) throw Refusal{Status::insufficient_data, "the motor has no torque"};
+    if (!(torque > 0)) throw Refusal{Status::insufficient_data, "no torque goes through the teeth"};
     const GapTraverseSettings::Flank flank = s.flank_under(torque);
     s.stiffness = flank.stiffness, s.damping = flank.damping;
   };
   if (!s.flank_under) return make(s);
   if (!record.has(record::Channel::motor_torque))
     throw Refusal{Status::insufficient_data, "needs motor_torque, as the declared teeth are no spring"};
-  std::vector<double> sizes;
-  for (const double torque : record.column(record::Channel::motor_torque)) sizes.push_back(std::fabs(torque));
-  press(signal::median(std::move(sizes)));
+  double squares = 0;
+  for (const double torque : record.column(record::Channel::motor_torque)) squares += torque * torque;
+  press(std::sqrt(squares / double(record.size())));
   press(make(s).level);
   return make(s);
 }

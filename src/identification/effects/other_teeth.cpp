@@ -51,7 +51,7 @@ std::optional<Hypothesis> fitted_with(const model::Rig& teeth, const std::vector
   return other;
 }
 
-/// The law of those that leave least.
+/// With the law that leaves least.
 std::optional<Hypothesis> best_of(const std::vector<model::Rig>& laws, const std::vector<Effect>& effects,
                                   const Hypothesis& h, const SearchContext& context) {
   std::optional<Hypothesis> best;
@@ -78,7 +78,8 @@ std::vector<Candidate> effects_of_teeth(const model::MotionRange& range) {
   return all;
 }
 
-/// Whether linear teeth with an effect leave less: such as harden by a power, as cubic ones, or lose.
+/// Whether linear teeth with one more effect of the teeth leave less: hardening by a power, as of cubic ones,
+/// or what they lose.
 bool rather_linear(const Hypothesis& other, const Hypothesis& h, const SearchContext& context) {
   for (const Candidate& candidate : effects_of_teeth(context.range)) {
     std::vector<Effect> effects = h.effects;
