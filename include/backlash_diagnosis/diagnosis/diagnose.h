@@ -37,7 +37,7 @@ struct DiagnosisSettings {
   }
   std::optional<GapTraverseSettings> gap_traverse;
   std::string no_gap_traverse =  // the same
-      "the rig has no free load behind rigid couplings and a mesh of one law";
+      "the rig has no free load behind rigid couplings and damped teeth of one contact law";
   /// The same of gap_traverse.
   void leave_out_gap_traverse(
       const std::string& why = "takes a second: not run here, but by diagnose_record") {

@@ -154,7 +154,7 @@ std::optional<OutputError> with_hertzian_fit(const OutputError& fit, const std::
       throw;
     } catch (const Error& error) {  // values that no machine has, or with which the load runs away
       warnings.push_back(
-          fmt::format("Hertzian teeth ({}) cannot be fitted, so that the errors do not hold them: {}",
+          fmt::format("teeth of Hertz ({}) cannot be fitted, so that the errors do not hold them: {}",
                       teeth.mesh.contact_spec().law, error.what()));
     }
   }
