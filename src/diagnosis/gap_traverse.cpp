@@ -38,9 +38,6 @@ constexpr double kFarFromDeclared = 4;  // spreads of a declared value
 constexpr double kLeft = 0.35;          // of the deflection or the torque, that is not explained
 constexpr double kVague = 4;            // upper over lower end of an interval, by which it says too little
 // The interval.
-constexpr double kLaw = 0.2;  // of a flank's deflection, 95 %: laws of teeth in no prior: simulation
-// Theory: Hertz's flanks fitted by lines move the gap by 0.30 of the deflection, and leave 0.0327 rms.
-constexpr double kLawOfLeft = 0.30 / 0.0327;
 constexpr double kPlaces = 5;  // times the place that is unknown while a time is, 95 %: simulation
 // Of the play: what moves it beside the declared, by the motor alone and with the load's encoder, whose error
 // follows the place; 95 %: simulation.
@@ -54,8 +51,8 @@ void check(const GapTraverseSettings& s) {
   require(s.motor_inertia > 0, "motor_inertia", s.motor_inertia, "must be > 0");
   require(s.load_inertia > 0, "load_inertia", s.load_inertia, "must be > 0");
   if (!s.flank_under) {
-    require(s.stiffness > 0, "stiffness", s.stiffness, "must be > 0");
-    require(s.damping > 0, "damping", s.damping, "must be > 0");
+    require(s.flank.stiffness > 0, "stiffness", s.flank.stiffness, "must be > 0");
+    require(s.flank.damping > 0, "damping", s.flank.damping, "must be > 0");
   }
   require(s.motor_damping >= 0, "motor_damping", s.motor_damping, "must be >= 0");
   require(s.motor_friction >= 0, "motor_friction", s.motor_friction, "must be >= 0");
@@ -144,8 +141,8 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
     throw Refusal{Status::out_of_domain,
                   fmt::format("no machine like that of the rig file explains the {}: {:.0f} % of it are left",
                               data.load.empty() ? "torque" : "motor's position less the load's", 100 * left)};
-  const double tried = std::isnan(s.unexplained) ? HUGE_VAL : kLawOfLeft * s.unexplained;  // rad
-  const double model = data.load.empty() ? kModel : kModelByLoad;
+  const double unknown = unknown_law(data, s);
+  const double model = data.load.empty() ? kModel : kModelByLoad * unknown;
   double lower = gap, upper = gap;
   for (const TraverseFit& fit : fits) {
     const double half = std::hypot(
@@ -156,7 +153,7 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
           fmt::format("{} windows of the record show the play only from {:.2g} to {:.2g} rad: moves that "
                       "reverse, and press both flanks, would do",
                       windows, fit.gap() * std::exp(-half), fit.gap() * std::exp(half))};
-    const double law = std::hypot(std::min(tried, kLaw * deflection(fit, data)), kPlaces * data.unsure_place);
+    const double law = std::hypot(unknown * kUnknownLaw * deflection(fit, data), kPlaces * data.unsure_place);
     lower = std::min(lower, fit.gap() - std::hypot(fit.gap() * (1 - std::exp(-half)), law));
     upper = std::max(upper, fit.gap() + std::hypot(fit.gap() * (std::exp(half) - 1), law));
   }
@@ -183,8 +180,7 @@ template <typename Make>
 TraverseData with_teeth(GapTraverseSettings& s, const record::Record& record, const Make& make) {
   const auto press = [&](double torque) {
     if (!(torque > 0)) throw Refusal{Status::insufficient_data, "no torque goes through the teeth"};
-    const GapTraverseSettings::Flank flank = s.flank_under(torque);
-    s.stiffness = flank.stiffness, s.damping = flank.damping;
+    s.flank = s.flank_under(torque);
   };
   if (!s.flank_under) return make(s);
   if (!record.has(record::Channel::motor_torque))
@@ -271,7 +267,7 @@ void by_motor(Estimate& e, const record::Record& record, GapTraverseSettings s) 
   require_crossings(first, kFewestFirst);
   std::vector<double> starts;
   for (const double factor : kGapFactors)
-    starts.push_back(factor * std::max(s.gap, first.level / s.stiffness));
+    starts.push_back(factor * std::max(s.gap, first.level / s.flank.stiffness));
   const Fits early =
       traverse_guesses(first, s, first.windows, Eigen::VectorXd::Zero(kTraverseValues), starts, 1);
   if (early.empty())

@@ -56,7 +56,7 @@ double noise_of(const std::vector<double>& weights, double torque, double differ
 }
 
 double cycle_of(const GapTraverseSettings& s) {
-  return 2 * M_PI / std::sqrt(s.stiffness * (1 / s.motor_inertia + 1 / s.load_inertia));
+  return 2 * M_PI / std::sqrt(s.flank.stiffness * (1 / s.motor_inertia + 1 / s.load_inertia));
 }
 
 void check_samples(const record::Record& record, double interval, double cycle, double fewest) {

@@ -15,10 +15,11 @@ double shown_too_much(const TraverseData& data, const TraverseRun& run, std::siz
 
 namespace {
 
-// Deflections, in those under the usual torque, between which stiffness and damping follow powers: beyond, no
-// teeth go, but fits that begin far away, whose steps would not be stable there. And powers beyond which no
-// fit comes.
-constexpr double kLeastDeflection = 1e-30, kMostDeflection = 10, kMostPower = 10;
+// Deflections, in those under the usual torque, between which stiffness and damping follow powers. Where
+// teeth touch the deflection is what rounding has left, and a small power of that, of a damper, a random
+// number: the motion would jump from machine to machine, and no fit could follow. Beyond, no teeth go, but
+// fits that begin far away, whose steps would not be stable there. And powers beyond which no fit comes.
+constexpr double kLeastDeflection = 1e-6, kMostDeflection = 10, kMostPower = 10;
 
 template <typename Lanes>
 constexpr int kLanesOf = static_cast<int>(sizeof(Lanes) / sizeof(double));

@@ -23,6 +23,8 @@ constexpr double kPower = 1.22;  // theory: in the middle between lines (1) and 
 constexpr double kDampingPower = 0.75,
                  kKnownDampingPower = 0.5;  // theory: from a damper (0) to Hunt and Crossley's (1.5)
 constexpr double kUsualHardening = 0.15, kKnownHardening = 1;  // choice: 0.05 to 0.4
+// Theory: Hertz's flanks fitted by lines move the gap by 0.30 of the deflection, and leave 0.0327 rms.
+constexpr double kLawOfLeft = 0.30 / 0.0327;
 constexpr double kEccentricity = 2e-4;          // rad, of an encoder's disk: 5 um of a radius of 25 mm
 constexpr double kSkew = 1e-3;                  // s, of the load's encoder: choice
 constexpr double kStartSpread[] = {0.5, 5e-2};  // of the deflection, of the rms speed's scale: choice
@@ -40,9 +42,9 @@ fit::Priors shared_priors(const TraverseData& data, const GapTraverseSettings& s
   };
   const double speed = data.slow * 100;  // rms
   fit::Priors p(kTraverseValues);
-  p[kTraverseGap] = {"gap", std::max(s.gap, data.level / s.stiffness), kKnownGap, true};
-  p[kTraverseStiffness] = {"stiffness of the mesh", s.stiffness, kKnownStiffness, true};
-  p[kTraverseDamping] = {"damping of the mesh", s.damping, kKnownDamping, true};
+  p[kTraverseGap] = {"gap", std::max(s.gap, data.level / s.flank.stiffness), kKnownGap, true};
+  p[kTraverseStiffness] = {"stiffness of the mesh", s.flank.stiffness, kKnownStiffness, true};
+  p[kTraverseDamping] = {"damping of the mesh", s.flank.damping, kKnownDamping, true};
   p[kTraverseLoadInertia] = {"inertia of the load", s.load_inertia, kKnownInertia, true};
   p[kTraverseMotorInertia] = {"inertia of the motor", s.motor_inertia, kKnownInertia, true};
   p[kTraverseMotorDamping] = friction("damping of the motor", s.motor_damping, speed);
@@ -50,10 +52,15 @@ fit::Priors shared_priors(const TraverseData& data, const GapTraverseSettings& s
   p[kTraverseLoadFriction] = friction("dry friction of the load", s.load_friction, 1);
   p[kTraverseLoadDamping] = friction("damping of the load", s.load_damping, speed);
   p[kTraverseLoadTerms] = {"declared torque on the load", 1, s.load_torque ? kKnownInertia : 0, true};
-  p[kTraversePower] = {"power of the torque of the teeth over the deflection", kPower, kKnownPower, true};
-  p[kTraverseHardening] = {"hardening of the teeth", kUsualHardening, kKnownHardening, true};
-  p[kTraverseDampingPower] = {"power of the damping over the deflection", kDampingPower, kKnownDampingPower,
-                              false};
+  const double unknown = unknown_law(data, s), known = 1 - unknown;  // between the declared law and any
+  p[kTraversePower] = {"power of the torque of the teeth over the deflection",
+                       std::pow(s.flank.power, known) * std::pow(kPower, unknown), unknown * kKnownPower,
+                       true};
+  p[kTraverseHardening] = {"hardening of the teeth", unknown * kUsualHardening, unknown * kKnownHardening,
+                           true};
+  p[kTraverseDampingPower] = {"power of the damping over the deflection",
+                              known * s.flank.damping_power + unknown * kDampingPower,
+                              unknown * kKnownDampingPower, false};
   p[kTraverseLate] = {"delay of the torque", kHeld, std::max(kKnownHeld, kKnownLag / data.interval), false};
   for (int n = 0; n < kTorqueWaves; ++n)
     p[std::size_t(kTraverseWave) + std::size_t(n)] = {
@@ -77,7 +84,7 @@ fit::Priors shared_priors(const TraverseData& data, const GapTraverseSettings& s
 }
 
 fit::Priors own_priors(const TraverseData& data, const GapTraverseSettings& s) {
-  const double deflection = 1 / s.stiffness, speed = data.slow * 100;
+  const double deflection = 1 / s.flank.stiffness, speed = data.slow * 100;
   fit::Priors p(kTraverseOwn);
   const bool by_load = !data.load.empty();
   // Without the load's encoder what a window knows of its start comes from the torque there, with its noise.
@@ -95,6 +102,11 @@ fit::Priors own_priors(const TraverseData& data, const GapTraverseSettings& s) {
 }
 
 }  // namespace
+
+double unknown_law(const TraverseData& data, const GapTraverseSettings& s) {
+  if (std::isnan(s.unexplained)) return 1;
+  return std::min(1.0, kLawOfLeft * s.unexplained / (kUnknownLaw * data.level / s.flank.stiffness));
+}
 
 TraverseWindows::TraverseWindows(const TraverseData& data, const GapTraverseSettings& settings,
                                  std::vector<TraverseWindow> windows)

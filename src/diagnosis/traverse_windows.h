@@ -10,6 +10,12 @@
 
 namespace backlash::diagnosis {
 
+constexpr double kUnknownLaw = 0.2;  ///< of a flank's deflection, 95 %: laws of teeth in no prior: simulation
+
+/// How little is known of the law of the teeth: 1, and less of a commissioned machine that left little, as
+/// another law would have left more; to 0.
+double unknown_law(const TraverseData& data, const GapTraverseSettings& settings);
+
 class TraverseWindows : public fit::Windows {
  public:
   /// `data` must outlive it.

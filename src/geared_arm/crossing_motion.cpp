@@ -9,8 +9,10 @@
 namespace backlash::geared_arm {
 namespace {
 
-constexpr double kLeastTorque = 1e-30;  // of the usual one, that has a logarithm
-constexpr int kMostChanges = 8;         // of flanks in a step: choice
+// Of the usual torque, below which no power is taken: where teeth touch it is what rounding has left, as in
+// diagnosis/traverse_motion.cpp.
+constexpr double kLeastTorque = 1e-6;
+constexpr int kMostChanges = 8;  // of flanks in a step: choice
 
 /// Teeth that are a spring at the usual torque `level` and yield by a power elsewhere; damping is constant
 /// for a spring and as the torque after Hertz, as in diagnosis/traverse_motion.cpp.

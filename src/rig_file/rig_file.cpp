@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kFreeElastic = 0.67;  // theory: of the deflection, of teeth 40 % softer than declared
 constexpr double kNormal95 = 1.96;     // standard deviations of 95 %, both ends: theory
-constexpr double kLittle = 1e-2;       // 1/s, of a deflection: a slope of its damping, above rounding
+constexpr double kLittle = 1e-2;  // of a deflection, and in a second: slopes of its torque, above rounding
 
 /// Where the file does not say how well it knows the elastic deflection that lost_motion subtracts. A mesh of
 /// angles is one spring with all that is merged into it, of the stated uncertainty.
@@ -95,7 +95,13 @@ std::function<double(double)> declared_load(const std::shared_ptr<const model::G
 diagnosis::GapTraverseSettings::Flank flank_under(const model::ContactLaw& law, double lever, double torque) {
   const double force = torque / lever, depth = law.static_penetration(force);
   const double rate = kLittle * depth;  // m/s, slow: of laws whose damping is no line as well
-  return {force / depth * lever * lever, (law.force(depth, rate, 0) - force) / rate * lever * lever};
+  const auto damping = [&](double x) { return (law.force(x, rate, 0) - law.force(x, 0, 0)) / rate; };
+  const auto power = [&](const auto& of) {
+    return std::log(of(depth * (1 + kLittle)) / of(depth * (1 - kLittle))) /
+           std::log((1 + kLittle) / (1 - kLittle));
+  };
+  return {force / depth * lever * lever, damping(depth) * lever * lever,
+          power([&](double x) { return law.force(x, 0, 0); }), power(damping)};
 }
 
 /// The same, with its values at the axis of motor_position.
@@ -114,18 +120,18 @@ std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
   s.load_damping = rig.link.viscous_damping / (ratio * ratio);
   if (const ParameterValues& values = rig.mesh.contact_spec().values;
       rig.mesh.contact_spec().law == "linear") {
-    s.stiffness = values.at("stiffness") * lever * lever, s.damping = values.at("damping") * lever * lever;
+    s.flank.stiffness = values.at("stiffness") * lever * lever;
+    s.flank.damping = values.at("damping") * lever * lever;
   } else {
     s.flank_under = [law = rig.mesh.contact, lever](double torque) {
       return flank_under(*law, lever, torque);
     };
-    const auto under_one = s.flank_under(1);  // N m: whether it has both
-    s.stiffness = under_one.stiffness, s.damping = under_one.damping;
+    s.flank = s.flank_under(1);  // N m: whether it has both
   }
   s.gap = rig.backlash_angle(rig.mesh.backlash);
   s.motor_turn = 2 * M_PI / (rig.motor_side ? 1 : rig.reduction_ratio);
   if (!rig.mesh.angular()) s.base_radius = 1 / rig.backlash_angle(1);
-  for (const double value : {s.motor_inertia, s.load_inertia, s.stiffness, s.damping})
+  for (const double value : {s.motor_inertia, s.load_inertia, s.flank.stiffness, s.flank.damping})
     if (!(value > 0)) return std::nullopt;
   if (rig.terms.empty()) return s;
   s.load_torque = declared_load(train, ratio);

@@ -43,9 +43,11 @@
 // clusters), 4 % of the play for what the machine does not hold (15 % by the motor alone) and the share of
 // the channel that is left beyond noise, and a fifth of the deflection of a flank under T0 for laws of teeth
 // that are none of these, and five times what the joint moves while the times of the samples are not known
-// (record/even_grid.h). Of a commissioned machine (GapTraverseSettings::unexplained) its law was tried: in
-// place of the fifth stands 9.2 times the rms of what the commissioning left beyond noise where that is less.
-// Counted on joints of test/campaigns/robot_joints that were drawn afterwards (doc/evidence/gap_traverse.md).
+// (record/even_grid.h). Of a commissioned machine (GapTraverseSettings::unexplained) the law of the teeth was
+// tried. In place of the fifth stands 9.2 times the rms of what the commissioning left beyond noise where
+// that is less; as much less p, r and h may differ from the declared law, and as much less of the 4 % is
+// added. Counted on joints of test/campaigns/robot_joints that were drawn afterwards
+// (doc/evidence/gap_traverse.md).
 //
 // Needs motor_position, and load_position or motor_torque. Samples are put on an even grid
 // (record/even_grid.h), of at least two samples in a cycle of the motor against the load, four by the motor
@@ -68,11 +70,12 @@ struct GapTraverseSettings {
   double motor_damping = 0;                          ///< N m s/rad, >= 0
   double load_damping = 0;                           ///< N m s/rad, >= 0
   double motor_friction = 0, load_friction = 0;      ///< N m, >= 0, dry
-  double stiffness = kNaN, damping = kNaN;           ///< N m/rad, N m s/rad, > 0, of the flanks
-  /// Of teeth that are no spring: both under a torque [N m], > 0, for T0 of the record; empty: a spring.
+  /// A flank under a torque: torque and damping follow these powers of the deflection nearby.
   struct Flank {
-    double stiffness, damping;
-  };
+    double stiffness = kNaN, damping = kNaN;  ///< N m/rad, N m s/rad, > 0
+    double power = 1, damping_power = 0;      ///< p > 0, r: a spring and a damper
+  } flank;
+  /// Of teeth that are no spring: `flank` for T0 [N m], > 0, of the record; empty: as it is.
   std::function<Flank(double torque)> flank_under;
   double gap = 0;                ///< rad, >= 0: where the fit begins, with any error
   double motor_turn = 2 * M_PI;  ///< rad of motor_position in a turn of the motor, > 0
