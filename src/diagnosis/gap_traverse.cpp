@@ -141,8 +141,7 @@ void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTrav
     throw Refusal{Status::out_of_domain,
                   fmt::format("no machine like that of the rig file explains the {}: {:.0f} % of it are left",
                               data.load.empty() ? "torque" : "motor's position less the load's", 100 * left)};
-  const double unknown = unknown_law(data, s);
-  const double model = data.load.empty() ? kModel : kModelByLoad * unknown;
+  const double model = data.load.empty() ? kModel : kModelByLoad, unknown = unknown_law(data, s);
   double lower = gap, upper = gap;
   for (const TraverseFit& fit : fits) {
     const double half = std::hypot(

@@ -45,9 +45,8 @@
 // that are none of these, and five times what the joint moves while the times of the samples are not known
 // (record/even_grid.h). Of a commissioned machine (GapTraverseSettings::unexplained) the law of the teeth was
 // tried. In place of the fifth stands 9.2 times the rms of what the commissioning left beyond noise where
-// that is less; as much less p, r and h may differ from the declared law, and as much less of the 4 % is
-// added. Counted on joints of test/campaigns/robot_joints that were drawn afterwards
-// (doc/evidence/gap_traverse.md).
+// that is less; as much less p, r and h may differ from those of the declared law. Counted on joints of
+// test/campaigns/robot_joints that were drawn afterwards (doc/evidence/gap_traverse.md).
 //
 // Needs motor_position, and load_position or motor_torque. Samples are put on an even grid
 // (record/even_grid.h), of at least two samples in a cycle of the motor against the load, four by the motor
