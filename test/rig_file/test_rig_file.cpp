@@ -146,6 +146,9 @@ TEST(RigFile, GapTraverseKnowsTeethThatAreNoSpringUnderATorque) {
     const auto flank = file.diagnosis.gap_traverse->flank_under(torque);
     EXPECT_NEAR(flank.stiffness, torque / (depth / radius), 1e-9 * flank.stiffness);
     EXPECT_NEAR(flank.damping, 10 * radius * radius, 1e-6 * flank.damping);  // of a difference
+    // d ln F / d ln d, by differences over 1 %: off by about its square.
+    EXPECT_NEAR(flank.power, depth / (force / 1e7 + 2.0 / 3 * std::pow(force / 2e9, 2.0 / 3)), 2e-4);
+    EXPECT_NEAR(flank.damping_power, 0, 1e-5);
   }
   EXPECT_FALSE(load(kTwoInertias).diagnosis.gap_traverse->flank_under);
 }
