@@ -210,6 +210,31 @@ TEST(TraverseWindows, ColumnsAreThoseOfEachAlone) {
   }
 }
 
+// Hertz's teeth after Hunt and Crossley, declared at the level of the record. A commissioning that left
+// nothing holds their law; one that left 0.0327 of a deflection, as lines leave of Hertz's teeth, knows no
+// more than none.
+TEST(TraverseWindows, ALawIsHeldAsFarAsItWasTried) {
+  const TraverseData data = some_data();
+  GapTraverseSettings s = some_settings();
+  s.flank.power = 1.5, s.flank.damping_power = 1.5;
+  const auto prior = [&](double unexplained, int value) {
+    s.unexplained = unexplained;
+    return TraverseWindows(data, s, data.windows).shared()[std::size_t(value)];
+  };
+  const double deflection = data.level / s.flank.stiffness;
+  for (const int value : {kTraversePower, kTraverseDampingPower}) {
+    EXPECT_DOUBLE_EQ(prior(0, value).value(0), 1.5);
+    EXPECT_EQ(prior(0, value).spread, 0);
+    EXPECT_EQ(prior(0.0327 * deflection, value).value(0), prior(kNaN, value).value(0));
+    EXPECT_EQ(prior(0.0327 * deflection, value).spread, prior(kNaN, value).spread);
+    const double little = prior(0.0327 * deflection / 30, value).spread;
+    EXPECT_GT(little, 0);
+    EXPECT_LT(little, 0.1 * prior(kNaN, value).spread);
+  }
+  EXPECT_EQ(prior(0, kTraverseHardening).value(0), 0);
+  EXPECT_GT(prior(kNaN, kTraverseHardening).value(0), 0);
+}
+
 TEST(TraverseMotion, WhatIsLeftIsTheTorqueLessWhatTheMachineNeeds) {
   const TraverseData data = some_data();
   const TraverseRun run = some_run(data, 3);

@@ -150,6 +150,11 @@ TEST(RigFile, GapTraverseKnowsTeethThatAreNoSpringUnderATorque) {
     EXPECT_NEAR(flank.power, depth / (force / 1e7 + 2.0 / 3 * std::pow(force / 2e9, 2.0 / 3)), 2e-4);
     EXPECT_NEAR(flank.damping_power, 0, 1e-5);
   }
+  const RigFile crossley = load(replaced(kTwoInertias, "law: linear, stiffness: 1.0e7, damping: 10",
+                                         "law: hunt_crossley, stiffness: 1.0e9, exponent: 1.4, alpha: 0.5"));
+  const auto flank = crossley.diagnosis.gap_traverse->flank_under(0.5);  // both follow K d^1.4
+  EXPECT_NEAR(flank.power, 1.4, 1e-9);
+  EXPECT_NEAR(flank.damping_power, 1.4, 1e-6);  // of a difference
   EXPECT_FALSE(load(kTwoInertias).diagnosis.gap_traverse->flank_under);
 }
 
