@@ -28,7 +28,7 @@ std::vector<ArmFit> fits_alone(const ArmRig& rig, const std::vector<RecordMotion
     ArmRig declared = rig;
     RecordMotions motions = record;
     try {
-      fits.push_back(fit_arm_and_friction_speeds(declared, motions, settings, progress));
+      fits.push_back(fit_arm_and_friction_turns(declared, motions, settings, progress));
     } catch (const CannotIdentify&) {  // nothing moves long enough: it cannot contradict
     }
   }
@@ -190,7 +190,7 @@ ArmFit fit_records(const ArmRig& declared, const std::vector<RecordMotions>& rec
     throw CannotIdentify(
         "all records carry something: what the arm is without it takes at least one record without a "
         "payload");
-  ArmFit fit = fit_arm_and_friction_speeds(rig, motions, settings, progress);
+  ArmFit fit = fit_arm_and_friction_turns(rig, motions, settings, progress);
   if (std::any_of(carried.begin(), carried.end(), [](const auto& c) { return c.has_value(); })) {
     const std::vector<std::string> before = std::move(fit.warnings);
     fit = fit_loaded(rig, records, carried, settings, progress);

@@ -179,22 +179,20 @@ std::string joint_effect_text(const JointEffect& effect) {
   return text + "}";
 }
 
-namespace {
-
-/// Way since the joint last turned round, at the samples; before the first turn it counts as long ago.
-Eigen::ArrayXd way_since_reversal(const ArmMotion& m, Eigen::Index j) {
-  Eigen::ArrayXd way(m.motor_v.rows());
-  double sum = INFINITY, before = 0;
+Eigen::ArrayXd way_since_reversal(const Eigen::VectorXd& speed, double interval) {
+  Eigen::ArrayXd way(speed.size());
+  double sum = INFINITY, before = 0, direction = 0;
   for (Eigen::Index k = 0; k < way.size(); ++k) {
-    const double v = m.motor_v(k, j);
-    sum = v * before < 0 ? 0 : sum + std::fabs(v) * m.interval;
-    if (v != 0) before = v;
+    const double v = speed[k];
+    const bool turned = v * direction < 0;
+    const double part = v * before < 0 ? v / (v - before) : 1;  // of the interval, since it turned
+    sum = (turned ? 0 : sum + std::fabs(before) * interval / 2) + part * std::fabs(v) * interval / 2;
+    if (v != 0) direction = v;
+    before = v;
     way[k] = sum;
   }
   return way;
 }
-
-}  // namespace
 
 Eigen::MatrixXd effect_columns(const JointEffect& effect, const ArmMotion& m, std::size_t joint,
                                const Eigen::VectorXd& load) {
@@ -202,7 +200,7 @@ Eigen::MatrixXd effect_columns(const JointEffect& effect, const ArmMotion& m, st
   const JointEffectSpec& spec = effect.spec();
   const EffectLaw law(effect);
   Eigen::ArrayXd way = Eigen::ArrayXd::Zero(m.q.rows());
-  if (spec.shape == EffectShape::distance) way = way_since_reversal(m, j);
+  if (spec.shape == EffectShape::distance) way = way_since_reversal(m.motor_v.col(j), m.interval);
   Eigen::MatrixXd out(m.q.rows(), spec.columns);
   for (Eigen::Index k = 0; k < out.rows(); ++k)
     out.row(k) = law.units({0, m.q(k, j), m.motor_v(k, j), m.sign(k, j), load[k], way[k]}).head(spec.columns);

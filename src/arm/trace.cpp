@@ -91,7 +91,7 @@ void Tracer::set_base() {
   if (rig_.fitted)
     fits_.base.rig = rig_;
   else
-    fits_.base = fit_arm_and_friction_speeds(rig_, train_, settings_.fit);
+    fits_.base = fit_arm_and_friction_turns(rig_, train_, settings_.fit);
   for (ArmMotion& m : test_) set_friction_speeds(m, rig_);
   for (const std::string& warning : fits_.base.warnings) trace_.warnings.push_back(warning);
   fits_.train_errors = relative_errors(fits_.base, {}, as_fitted(train_, false), settings_.fit.least_seconds);

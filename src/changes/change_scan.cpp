@@ -4,10 +4,19 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "healthy_columns.h"
 
 namespace backlash::changes {
+
+void Background::add_unknown(const Eigen::MatrixXd& more) {
+  const Eigen::Index p = columns.cols();
+  columns.conservativeResize(Eigen::NoChange, p + more.cols());
+  columns.rightCols(more.cols()) = more;
+  spread.conservativeResize(p + more.cols());
+  spread.tail(more.cols()).setConstant(std::numeric_limits<double>::infinity());
+}
 
 void Background::solve() {
   Eigen::MatrixXd information = columns.transpose() * columns / variance;

@@ -21,7 +21,8 @@ struct Background {
   Eigen::MatrixXd inverse;   // of the information of the columns
   Eigen::VectorXd estimate;  // of the columns' values
 
-  void solve();  // `inverse`, `estimate` from the rest
+  void add_unknown(const Eigen::MatrixXd& more);  // columns of whose values nothing is known
+  void solve();                                   // `inverse`, `estimate` from the rest
   Eigen::VectorXd left() const { return residual - columns * estimate; }
   /// What the best values leave, in variances, with the prior's price of their size: a gain is taken from it.
   double misfit() const {

@@ -4,7 +4,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "backlash_diagnosis/base/error.h"
 #include "onset_threshold.h"
@@ -52,14 +51,7 @@ Background ChangeSearch::background(const std::vector<FoundChange>& others) cons
   b.residual = first_.residual;
   b.columns = first_.nuisances;
   b.spread = first_.spread;
-  for (const FoundChange& f : others) {
-    const Eigen::MatrixXd z = found_columns(f);
-    const Eigen::Index p = b.columns.cols();
-    b.columns.conservativeResize(Eigen::NoChange, p + z.cols());
-    b.columns.rightCols(z.cols()) = z;
-    b.spread.conservativeResize(p + z.cols());
-    b.spread.tail(z.cols()).setConstant(std::numeric_limits<double>::infinity());
-  }
+  for (const FoundChange& f : others) b.add_unknown(found_columns(f));
   b.variance = noise_variance(model_, motion_);
   b.solve();
   return b;
@@ -259,8 +251,9 @@ void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
 /// The record as a whole has another value of the effect: a nuisance from then on, and a difference where no
 /// healthy record has it, too.
 void ChangeSearch::differ(FoundChange f) {
-  if (!scores_.is_healthy(f.effect, f.score, f.inflation, threshold(f.score.values.size())))
+  if (!scores_.is_healthy(f.effect, f.score, f.inflation, threshold(f.score.values.size()), lasting_))
     different_.push_back(f.effect.name());
+  lasting_.push_back(f.effect);
   f.from = 0;
   f.to = blocks_ + 1;
   const Background with = background({f});

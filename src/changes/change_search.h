@@ -108,6 +108,7 @@ class ChangeSearch {
   const std::vector<FoundChange> beside_;
   Whitened first_;
   Eigen::Index beside_column_ = 0;      // the first of what stands beside
+  std::vector<ChangeEffect> lasting_;   // that the record has from its beginning, also as healthy ones have
   std::vector<std::string> different_;  // effects that the record has from its beginning
   bool like_fault_ = false;
   std::optional<FoundChange> left_by_shape_;  // the likeliest beside those found, too little to be reported

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "backlash_diagnosis/arm/friction_speed.h"
+#include "backlash_diagnosis/arm/friction_turn.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 
@@ -17,7 +17,7 @@ arm::ArmFit fitted(const arm::ArmRig& rig, const std::vector<arm::ArmRecord>& he
   for (const arm::ArmRecord& record : healthy)
     for (arm::ArmMotion& m : motions_of(record, rig, warnings)) motions.push_back(std::move(m));
   arm::ArmRig turned = rig;
-  return arm::fit_arm_and_friction_speeds(turned, motions);
+  return arm::fit_arm_and_friction_turns(turned, motions);
 }
 
 }  // namespace

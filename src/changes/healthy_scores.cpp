@@ -39,12 +39,15 @@ double HealthyScores::most_growth(const ChangeEffect& effect) const {
 }
 
 bool HealthyScores::is_healthy(const ChangeEffect& effect, const EffectSums::Score& found, double inflation,
-                               double threshold) const {
+                               double threshold, const std::vector<ChangeEffect>& beside) const {
   bool shown = false;
   for (std::size_t r = 0; r < records_->size(); ++r) {
     const SampledMotion& motion = (*records_)[r];
-    const EffectSums sums(motion, *effect_columns(motion, effect), backgrounds_[r], block_, effect.ramp);
-    const EffectSums::Score own = sums.score(0, sums.blocks(), backgrounds_[r]);
+    Background b = backgrounds_[r];
+    for (const ChangeEffect& other : beside) b.add_unknown(*effect_columns(motion, other));
+    if (!beside.empty()) b.solve();
+    const EffectSums sums(motion, *effect_columns(motion, effect), b, block_, effect.ramp);
+    const EffectSums::Score own = sums.score(0, sums.blocks(), b);
     if (own.values.size() != found.values.size()) continue;
     shown = true;
     const Eigen::VectorXd by = found.values - own.values;

@@ -16,10 +16,11 @@ class HealthyScores {
   /// The largest gain of its growth to the end of a healthy record, from any onset on.
   double most_growth(const ChangeEffect& effect) const;
   /// Whether an effect of these values over a whole record is one that a healthy record has as well: its own
-  /// values there are the same by `threshold` (of twice the log likelihood ratio, scores inflated). Also
-  /// where none of them shows it: then the motion is another one, and nobody knows the machine there.
+  /// values there, beside the same others, are the same by `threshold` (of twice the log likelihood ratio,
+  /// scores inflated). Also where none of them shows it: then the motion is another one, and nobody knows the
+  /// machine there.
   bool is_healthy(const ChangeEffect& effect, const EffectSums::Score& found, double inflation,
-                  double threshold) const;
+                  double threshold, const std::vector<ChangeEffect>& beside) const;
 
  private:
   std::shared_ptr<const std::vector<SampledMotion>> records_;

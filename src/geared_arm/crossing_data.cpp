@@ -42,7 +42,7 @@ void smooth(const std::vector<double>& x, Eigen::Index reach, double interval, E
 /// Motors of one stretch of the record: rows all samples, columns all joints of the rig. Torques are those
 /// that turn the motors.
 struct Stretch {
-  Eigen::MatrixXd position, rate, torque, load;
+  Eigen::MatrixXd position, rate, torque, load, way;
 };
 
 Stretch stretch_of(const arm::ArmRig& rig, const arm::ArmRecord& record, const arm::ArmMotion& motion,
@@ -50,11 +50,12 @@ Stretch stretch_of(const arm::ArmRig& rig, const arm::ArmRecord& record, const a
   const auto n = Eigen::Index(motion.time.size()), joints = motion.q.cols();
   Stretch s;
   s.position.resize(n, joints), s.rate.resize(n, joints), s.torque.resize(n, joints),
-      s.load.resize(n, joints);
+      s.load.resize(n, joints), s.way.resize(n, joints);
   for (Eigen::Index j = 0; j < joints; ++j) {
     const record::Record even = record::evenly_sampled(
         record.joints[std::size_t(j)].slice(motion.time.front(), motion.time.back() + motion.interval / 2));
     smooth(even.column(Channel::motor_position), reach, motion.interval, j, s.position, s.rate);
+    s.way.col(j) = arm::way_since_reversal(s.rate.col(j), motion.interval);
     const arm::JointDrive& drive = rig.joints[std::size_t(j)];
     const std::vector<double> torque =
         signal::delayed(even.column(rig.channel), -drive.delay / motion.interval);
@@ -79,8 +80,8 @@ Stretch stretch_of(const arm::ArmRig& rig, const arm::ArmRecord& record, const a
 }
 
 double motor_friction(const arm::ArmRig& rig, std::size_t joint, const DriveEffects& effects, double position,
-                      double speed, double load) {
-  const model::JointMoment now{0, position, speed, std::tanh(speed / rig.friction_speed(joint)), load};
+                      double speed, double load, double way) {
+  const model::JointMoment now{0, position, speed, std::tanh(speed / rig.friction_speed(joint)), load, way};
   return arm::drive_friction(rig.joints[joint], now) + effects.torque(now);
 }
 
@@ -126,8 +127,8 @@ CrossingWindow window_of(const CrossingData& data, const arm::ArmRig& rig, const
     for (Eigen::Index i = 0; i < samples; ++i) {
       w.position(i, c) = s.position(begin + i, j), w.rate(i, c) = s.rate(begin + i, j);
       w.torque(i, c) = s.torque(begin + i, j), w.chain(i, c) = s.load(begin + i, j);
-      w.friction(i, c) =
-          motor_friction(rig, joint.joint, effects, w.position(i, c), w.rate(i, c), w.chain(i, c));
+      w.friction(i, c) = motor_friction(rig, joint.joint, effects, w.position(i, c), w.rate(i, c),
+                                        w.chain(i, c), s.way(begin + i, j));
       const double moving = std::tanh(w.rate(i, c) / (kStandstill * rig.friction_speed(joint.joint)));
       w.unsure(i, c) = kUnsureFriction * joint.coulomb * (1 - moving * moving);
     }

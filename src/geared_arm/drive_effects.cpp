@@ -19,8 +19,11 @@ DriveEffects::DriveEffects(const arm::ArmRig& rig, std::size_t joint) {
       const std::vector<std::string> names = rig.joint_names();
       const auto other = std::find(names.begin(), names.end(), effect.other);
       couplings_.emplace_back(std::size_t(other - names.begin()), effect.values[0]);
-    } else if (has_law(effect.spec()) && effect.spec().shape != arm::EffectShape::distance) {
-      momentary_.emplace_back(effect, effect.values);
+    } else if (has_law(effect.spec())) {
+      laws_.emplace_back(effect, effect.values);
+      if (effect.spec().shape == arm::EffectShape::distance)
+        bristles_.push_back(
+            {effect.values[0], effect.shape, effect.given.has("damping") ? effect.given.at("damping") : 0});
     }
   }
   gain_ = 1 / (1 + recorded_more(rig.joints[joint].effects));
@@ -35,7 +38,7 @@ double DriveEffects::recorded_more(const std::vector<arm::JointEffect>& effects)
 
 double DriveEffects::torque(const model::JointMoment& now) const {
   double sum = 0;
-  for (const auto& [law, values] : momentary_) sum += values.dot(law.units(now));
+  for (const auto& [law, values] : laws_) sum += values.dot(law.units(now));
   return sum;
 }
 

@@ -45,7 +45,6 @@ GearedJoint read_joint(const YamlReader& yaml, const arm::JointDrive& drive, boo
     yaml.fail("effects", "gains that together leave the motor no torque");
   for (const arm::JointEffect& effect : drive.effects) {
     const arm::JointEffectSpec& spec = effect.spec();
-    if (spec.shape == arm::EffectShape::distance) yaml.fail("effects", effect.id + " cannot be simulated");
     if (spec.drive_term == std::string("load") && !geared) yaml.fail("effects", effect.id + " " + no_mesh);
   }
   if (joint.held) {

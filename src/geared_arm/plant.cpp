@@ -17,11 +17,14 @@ constexpr double kSameTime = 1e-12;  // relative: rounding of a time that is a s
 // Play and deflection are differences of angles; a finer tolerance would not improve them. As for one joint.
 constexpr double kLargestAngle = 0.1;  // rad
 
-std::vector<simulation::StateTolerance> tolerances(Eigen::Index angles,
+constexpr double kBristles = 1e-6;  // of their friction; choice
+
+std::vector<simulation::StateTolerance> tolerances(Eigen::Index angles, std::size_t states,
                                                    const simulation::SolverSettings& solver) {
   std::vector<simulation::StateTolerance> all(std::size_t(angles),
                                               {solver.position_tolerance, kLargestAngle});
   all.resize(std::size_t(2 * angles), simulation::StateTolerance{solver.velocity_tolerance});
+  all.resize(states, simulation::StateTolerance{kBristles});
   return all;
 }
 
@@ -53,14 +56,19 @@ ArmPlant::ArmPlant(const GearedArm& arm)
       rotors_[Eigen::Index(j)] = arm_.rig.joints[j].terms[std::size_t(arm::DriveTerm::rotor_inertia)];
     drives_.push_back(std::move(drive));
   }
-  state_.assign(std::size_t(2 * angles_), 0.0);
+  std::size_t states = 2 * std::size_t(angles_);
+  for (Drive& drive : drives_) {
+    drive.bristles = states;
+    states += drive.effects.bristles().size();
+  }
+  state_.assign(states, 0.0);
   for (std::size_t j = 0; j < arm_.joints.size(); ++j) {
     state_[j] = arm_.joints[j].held.value_or(arm_.joints[j].start);
     if (drives_[j].motor >= 0) state_[std::size_t(drives_[j].motor)] = state_[j];
   }
   integrator_ = std::make_unique<simulation::Integrator>(
       [this](double t, const double* state, double* rate) { derivative(t, state, rate); },
-      tolerances(angles_, arm_.solver), arm_.solver);
+      tolerances(angles_, states, arm_.solver), arm_.solver);
 }
 
 arm::Joints ArmPlant::link_positions() const {
@@ -94,9 +102,31 @@ double ArmPlant::mesh_torque(std::size_t joint, const double* state) const {
   return depth > 0 ? side * std::fmax(0, gear.contact->force(depth, side * rate, 0)) : 0;
 }
 
-double ArmPlant::motor_friction(std::size_t joint, double position, double speed, double load) const {
-  const model::JointMoment now{0, position, speed, std::tanh(speed / arm_.rig.friction_speed(joint)), load};
-  return arm::drive_friction(arm_.rig.joints[joint], now) + drives_[joint].effects.torque(now);
+std::size_t ArmPlant::motor_angle(std::size_t joint) const {
+  return drives_[joint].motor >= 0 ? std::size_t(drives_[joint].motor) : joint;
+}
+
+double ArmPlant::motor_friction(std::size_t joint, const double* state, double load) const {
+  const Drive& drive = drives_[joint];
+  const std::size_t angle = motor_angle(joint);
+  const double speed = state[std::size_t(angles_) + angle];
+  const model::JointMoment now{0, state[angle], speed, std::tanh(speed / arm_.rig.friction_speed(joint)),
+                               load};
+  double sum = arm::drive_friction(arm_.rig.joints[joint], now) + drive.effects.torque(now);
+  for (std::size_t i = 0; i < drive.effects.bristles().size(); ++i) {
+    const DriveEffects::Bristles& bristles = drive.effects.bristles()[i];
+    const double z = state[drive.bristles + i];
+    sum += bristles.torque * (z - now.direction) + bristles.damping * (speed - std::fabs(speed) * z);
+  }
+  return sum;
+}
+
+void ArmPlant::bristle_rates(std::size_t joint, const double* state, double* rate) const {
+  const Drive& drive = drives_[joint];
+  const double speed = state[std::size_t(angles_) + motor_angle(joint)];
+  for (std::size_t i = 0; i < drive.effects.bristles().size(); ++i)
+    rate[drive.bristles + i] =
+        (speed - std::fabs(speed) * state[drive.bristles + i]) / drive.effects.bristles()[i].distance;
 }
 
 double ArmPlant::motor_torque(std::size_t joint, double t) const {
@@ -122,12 +152,13 @@ void ArmPlant::derivative(double t, const double* state, double* rate) const {
     if (motor >= 0) {
       const double mesh = mesh_torque(j, state), motor_speed = state[angles_ + motor];
       rate[motor] = motor_speed;
-      rate[angles_ + motor] = (drive - motor_friction(j, state[motor], motor_speed, mesh) - mesh) /
+      rate[angles_ + motor] = (drive - motor_friction(j, state, mesh) - mesh) /
                               arm_.rig.joints[j].terms[std::size_t(arm::DriveTerm::rotor_inertia)];
       drive = mesh;
     } else {
-      drive -= motor_friction(j, state[k], speed, 0);
+      drive -= motor_friction(j, state, 0);
     }
+    bristle_rates(j, state, rate);
     torque[k] = drive - joint.link_viscous * speed -
                 joint.link_coulomb * std::tanh(speed / arm_.rig.identification.friction_speed);
   }
@@ -180,8 +211,7 @@ void ArmPlant::advance_to(double t) {
 }
 
 model::Observation ArmPlant::observe(std::size_t joint) const {
-  const std::size_t angles = std::size_t(angles_);
-  const std::size_t motor = drives_[joint].motor >= 0 ? std::size_t(drives_[joint].motor) : joint;
+  const std::size_t angles = std::size_t(angles_), motor = motor_angle(joint);
   model::Observation o{};
   o.motor_torque = motor_torque(joint, time_);
   o.motor_position = state_[motor];
@@ -222,6 +252,8 @@ void ArmPlant::set_machine(const GearedArm& arm) {
     const GearedJoint &now = arm_.joints[j], &then = arm.joints[j];
     require(now.gear.has_value() == then.gear.has_value(), "gear of joint '" + arm.rig.joints[j].name + "'");
     require(now.held == then.held, "held of joint '" + arm.rig.joints[j].name + "'");
+    require(DriveEffects(arm.rig, j).bristles().size() == drives_[j].effects.bristles().size(),
+            "presliding of joint '" + arm.rig.joints[j].name + "'");
   }
   arm_.rig = arm.rig;
   chain_ = arm::loaded_chain(arm.rig);

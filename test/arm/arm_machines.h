@@ -214,7 +214,8 @@ struct Machine {
     if (effect.id == "transmission_coupling" || effect.id == "motor_torque_gain") return size * other;
     if (effect.id == "load_dependent_friction") return size * sign * std::fabs(load);
     if (effect.id != "presliding") return 0;
-    for (int i = 0; i < 20; ++i) dahl += 0.01 / 20 * (v - std::fabs(v) * dahl) / shape;
+    const double end = v > 0 ? 1 : -1;
+    dahl = end + (dahl - end) * std::exp(-std::fabs(v) * 0.01 / shape);
     return size * (dahl - sign);
   }
 

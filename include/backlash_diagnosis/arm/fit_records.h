@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/arm/friction_speed.h"
+#include "backlash_diagnosis/arm/friction_turn.h"
 
 namespace backlash::arm {
 
@@ -27,7 +27,7 @@ struct Carried {
   signal::Measured mass;  // kg; an error of NaN: not known
 };
 
-/// fit_arm_and_friction_speeds() of all records together; of two to eight also of each alone. Where they
+/// fit_arm_and_friction_turns() of all records together; of two to eight also of each alone. Where they
 /// contradict each other the fit says so (contradictions, a warning), and each standard error is at least as
 /// large as the distance to the value of any record alone. Throws as that, and CannotIdentify where friction
 /// of a joint comes out as a torque that drives it: a sign is wrong. Warns of joints of which a tenth of the

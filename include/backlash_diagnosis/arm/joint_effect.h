@@ -65,6 +65,10 @@ class EffectLaw {
   std::optional<model::TermColumns> term_;
 };
 
+/// Way [rad] since a joint last turned round, at samples of its speed [rad/s], which is straight between
+/// them; before the first turn it counts as long ago.
+Eigen::ArrayXd way_since_reversal(const Eigen::VectorXd& speed, double interval);
+
 /// Throws BadData with file, line and key.
 JointEffect read_joint_effect(const YamlReader& yaml);
 

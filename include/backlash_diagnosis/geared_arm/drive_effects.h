@@ -19,16 +19,24 @@ class DriveEffects {
   /// Recorded torque of the motor over the torque that it gives, less 1, by all gains together.
   static double recorded_more(const std::vector<arm::JointEffect>& effects);
 
-  /// What the drive has to supply for them [N m], without gain and couplings.
+  /// What the drive has to supply for them [N m], without gain and couplings. Bristles by `now.way`; where
+  /// that is infinite they have the direction of `now`.
   double torque(const model::JointMoment& now) const;
   /// The motor's torque over what is recorded of it.
   double gain() const { return gain_; }
+  /// Friction `torque` [N m] that builds up over `distance` x_s [rad] (Dahl, model/presliding.h): z of it is
+  /// there, with x_s dz/dt = v - |v| z, in place of the share S of the direction that all other dry friction
+  /// has.
+  struct Bristles {
+    double torque = 0, distance = 0, damping = 0;  // damping [N m s/rad] of x_s dz/dt more, LuGre
+  };
+  const std::vector<Bristles>& bristles() const { return bristles_; }
   /// Other joints, and the share of their drives' torque that this one has to supply.
   const std::vector<std::pair<std::size_t, double>>& couplings() const { return couplings_; }
 
  private:
-  std::vector<std::pair<arm::EffectLaw, Eigen::Vector2d>>
-      momentary_;  // those without a memory, and their values
+  std::vector<std::pair<arm::EffectLaw, Eigen::Vector2d>> laws_;  // and their values
+  std::vector<Bristles> bristles_;
   std::vector<std::pair<std::size_t, double>> couplings_;
   double gain_ = 1;
 };

@@ -53,12 +53,16 @@ class ArmPlant {
     double compensation = 0;  // N m, of gravity
     Eigen::Index motor = -1;  // place among the angles; -1: turns with the link
     DriveEffects effects;
+    std::size_t bristles = 0;  // place of their first state
   };
   void begin_segments();
   void compensate_gravity();
   void derivative(double t, const double* state, double* rate) const;
   double mesh_torque(std::size_t joint, const double* state) const;
-  double motor_friction(std::size_t joint, double position, double speed, double load) const;
+  double motor_friction(std::size_t joint, const double* state, double load) const;
+  void bristle_rates(std::size_t joint, const double* state, double* rate) const;
+  /// Place of the angle that the motor turns by; its speed is `angles_` farther.
+  std::size_t motor_angle(std::size_t joint) const;
   double acting_torque(std::size_t joint, double t) const;
   double motor_torque(std::size_t joint, double t) const;
   arm::Joints motor_positions() const;
@@ -68,7 +72,7 @@ class ArmPlant {
   std::vector<Drive> drives_;
   Eigen::Index links_, angles_;
   arm::Joints rotors_, given_;  // of joints without gear; 0 where held, NaN elsewhere
-  std::vector<double> state_;   // angles of links, of motors; their speeds
+  std::vector<double> state_;   // angles of links, of motors; their speeds; bristles of all joints
   double time_ = 0;
   bool begun_ = false;
   std::unique_ptr<simulation::Integrator> integrator_;

@@ -2,6 +2,7 @@
 #include "backlash_diagnosis/ros/arm/change_watch_node.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <chrono>
 #include <cmath>
@@ -18,7 +19,8 @@ namespace {
 
 using DiagnosticStatus = diagnostic_msgs::DiagnosticStatus;
 
-constexpr double kTick = 1;  // s of wall time from one report on /diagnostics to the next
+constexpr int kLargeCopy = 1 << 20;  // bytes; choice: a minute of one channel at 2 kHz
+constexpr double kTick = 1;          // s of wall time from one report on /diagnostics to the next
 
 std::vector<record::ChannelMap> channels_of(const std::vector<WatchSettings>& joints) {
   std::vector<record::ChannelMap> maps;
@@ -196,6 +198,9 @@ void ChangeWatchNode::describe(const JointWatch& joint, Status& status) const {
 }
 
 int change_watch_main(int argc, char** argv) {
+  // Copies of a record go back to the system after each look. Without a fixed threshold the allocator keeps
+  // the most that it ever needed, which looks like a leak.
+  mallopt(M_MMAP_THRESHOLD, kLargeCopy);
   return node_main(argc, argv, "change_watch", change_watch_help(), [] {
     const ros::NodeHandle handle, private_handle("~");
     ChangeWatchNode(handle, private_handle, load_change_watch_settings(private_handle)).run();
