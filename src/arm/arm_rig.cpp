@@ -99,6 +99,8 @@ JointDrive read_joint(const YamlReader& yaml, const record::ChannelMap& time, re
   joint.delay = yaml.number_or("delay", 0, Range::between(-kLongestDelay, kLongestDelay));
   yaml.uncertainty("delay");
   if (yaml.has("friction_speed")) joint.friction_speed = yaml.number("friction_speed", Range::positive());
+  if (yaml.has("friction_distance"))
+    joint.friction_distance = yaml.number("friction_distance", Range::positive());
   if (yaml.has("effects"))
     for (const YamlReader& effect : yaml.maps("effects")) joint.effects.push_back(read_joint_effect(effect));
   // of the room geared_arm
@@ -343,6 +345,8 @@ std::string joint_text(const ArmRig& rig, const JointDrive& joint) {
   }
   if (joint.friction_speed > 0)
     text += fmt::format("    friction_speed: {:.8g}  # rad/s\n", joint.friction_speed);
+  if (joint.friction_distance > 0)
+    text += fmt::format("    friction_distance: {:.8g}  # rad\n", joint.friction_distance);
   if (!joint.channels.columns.empty())
     text += "    channels:\n" + record::columns_text(joint.channels, "      ");
   if (joint.training_error > 0)

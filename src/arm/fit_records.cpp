@@ -126,7 +126,7 @@ ArmFit fit_loaded(const ArmRig& rig, std::vector<RecordMotions> records,
       freedom.weights.push_back(mass);
     }
     for (ArmMotion& m : records[r]) {
-      set_friction_speeds(m, rig);
+      set_friction_turns(m, rig);
       motions.push_back({&m, carries(carried, r) ? freedom.weights.size() : 0});
     }
   }

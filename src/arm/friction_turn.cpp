@@ -3,118 +3,77 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
+#include <functional>
 
+#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "fit_model.h"
-#include "joint_effects.h"
 
 namespace backlash::arm {
 namespace {
 
-constexpr double kOctaves[] = {1, 1 / 8.0, 1 / 4.0, 1 / 2.0, 2};  // of the rig's v_0; choice
+constexpr double kOctaves[] = {1 / 8.0, 1 / 4.0, 1 / 2.0, 2};  // of the rig's v_0; choice
 // Of teeth and bearings, 0.02 mm at a radius of 0.02 to 0.4 m; what takes a longer path is an effect that is
 // missing. Choice.
 constexpr double kPaths[] = {5e-5, 1e-4, 2e-4, 4e-4, 8e-4};  // rad
 constexpr double kClearly = 3;  // standard errors, of what blocks of time leave less; choice
 
-JointEffect presliding(const FrictionTurn& turn) {
-  return {"presliding", turn.distance, "", {turn.torque, 0}};
+void take(const FrictionTurn& turn, JointDrive& joint) {
+  joint.friction_speed = turn.speed;
+  joint.friction_distance = turn.distance;
 }
 
-bool has_path(const JointDrive& drive) {
-  return std::any_of(drive.effects.begin(), drive.effects.end(),
-                     [](const JointEffect& e) { return e.id == "presliding"; });
-}
-
-/// One joint in all motions: what is free of its drive, and what is left beside it.
-struct DriveColumns {
-  Eigen::MatrixXd columns;
-  Eigen::VectorXd residual;
-  std::vector<Eigen::Index> blocks;  // of the rows, in order
-};
-
-class Turns {
- public:
-  Turns(const ArmFit& fit, std::vector<ArmMotion>& motions, const FitSettings& settings)
-      : fit_(fit), motions_(motions), settings_(settings), state_(state_of(fit, {})) {}
-  ~Turns() {
-    for (ArmMotion& m : motions_) set_friction_speeds(m, fit_.rig);
-  }
-
-  /// Squares that each joint leaves in each block; with a path the turns get its torque.
-  std::vector<Eigen::VectorXd> left(std::vector<FrictionTurn>& turns);
-
- private:
-  DriveColumns columns_of(std::size_t joint, const FitModel& model,
-                          const std::vector<std::vector<Linearised>>& all, const FrictionTurn& turn) const;
-
-  const ArmFit& fit_;
-  std::vector<ArmMotion>& motions_;
-  const FitSettings& settings_;
-  const State state_;
-};
-
-DriveColumns Turns::columns_of(std::size_t joint, const FitModel& model,
-                               const std::vector<std::vector<Linearised>>& all,
-                               const FrictionTurn& turn) const {
-  const std::vector<DriveTerm>& terms = fit_.rig.terms;
-  const auto j = Eigen::Index(joint), drive = 10 * Eigen::Index(fit_.rig.joints.size());
+/// Squares that a joint leaves in each block of time, its drive's terms and its delay fitted anew.
+Eigen::VectorXd squares_left(std::size_t joint, const std::vector<ArmMotion>& motions,
+                             const std::vector<std::vector<Linearised>>& all, const ArmRig& rig,
+                             double block) {
+  const auto j = Eigen::Index(joint), drive = 10 * Eigen::Index(rig.joints.size());
+  const Eigen::Index terms = Eigen::Index(rig.terms.size());
   Eigen::Index rows = 0;
-  for (const ArmMotion& m : motions_) rows += m.counts.col(j).cast<Eigen::Index>().sum();
-  DriveColumns out{Eigen::MatrixXd(rows, Eigen::Index(terms.size()) + 1), Eigen::VectorXd(rows), {}};
-  Eigen::Index row = 0, block = 0;
-  for (std::size_t i = 0; i < motions_.size(); ++i, ++block) {
-    const ArmMotion& m = motions_[i];
+  for (const ArmMotion& m : motions) rows += m.counts.col(j).cast<Eigen::Index>().sum();
+  Eigen::MatrixXd columns(rows, terms + 1);
+  Eigen::VectorXd residual(rows);
+  std::vector<Eigen::Index> blocks;
+  Eigen::Index row = 0, number = 0;
+  for (std::size_t i = 0; i < motions.size(); ++i, ++number) {
+    const ArmMotion& m = motions[i];
     const Linearised& l = all[i][joint];
-    Eigen::VectorXd builds_up = Eigen::VectorXd::Zero(l.measured.size());
-    if (turn.distance > 0)
-      builds_up = model.effect_at_rows(state_, presliding(turn), joint, m,
-                                       Eigen::MatrixXd::Zero(m.q.rows(), m.q.cols()), {});
     double begin = m.time[m.rows.front()];
     for (Eigen::Index k = 0; k < m.counts.rows(); ++k) {
       const double t = m.time[m.rows[std::size_t(k)]];
-      if (t >= begin + settings_.block) begin = t, ++block;
+      if (t >= begin + block) begin = t, ++number;
       if (!m.counts(k, j)) continue;
-      for (std::size_t c = 0; c < terms.size(); ++c)
-        out.columns(row, Eigen::Index(c)) = l.sensitivity(k, drive + Eigen::Index(terms[c])) +
-                                            (terms[c] == DriveTerm::coulomb ? builds_up[k] : 0);
-      out.columns(row, out.columns.cols() - 1) = l.sensitivity(k, drive + Eigen::Index(kDriveTerms) + 1);
-      const double coulomb = state_.drives(j, Eigen::Index(DriveTerm::coulomb));
-      out.residual[row++] = l.measured[k] - l.predicted[k] - coulomb * builds_up[k];
-      out.blocks.push_back(block);
+      for (Eigen::Index c = 0; c < terms; ++c)
+        columns(row, c) = l.sensitivity(k, drive + Eigen::Index(rig.terms[std::size_t(c)]));
+      columns(row, terms) = l.sensitivity(k, drive + Eigen::Index(kDriveTerms) + 1);
+      residual[row++] = l.measured[k] - l.predicted[k];
+      blocks.push_back(number);
     }
   }
-  return out;
+  Eigen::MatrixXd h = signal::gram(columns);
+  h.diagonal() += (1e-9 * h.diagonal()).array().max(1e-300).matrix();  // terms that follow from others
+  const Eigen::VectorXd step = signal::solve_symmetric(h, Eigen::VectorXd(columns.transpose() * residual));
+  const Eigen::VectorXd left = residual - columns * step;
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(number);
+  for (Eigen::Index k = 0; k < left.size(); ++k) squares[blocks[std::size_t(k)]] += left[k] * left[k];
+  return squares;
 }
 
-std::vector<Eigen::VectorXd> Turns::left(std::vector<FrictionTurn>& turns) {
-  ArmRig rig = fit_.rig;
-  for (std::size_t j = 0; j < turns.size(); ++j) rig.joints[j].friction_speed = turns[j].speed;
+/// Of each joint.
+std::vector<Eigen::VectorXd> squares_left(const ArmFit& fit, std::vector<ArmMotion>& motions,
+                                          const std::vector<FrictionTurn>& turns, double block) {
+  ArmRig rig = fit.rig;
+  for (std::size_t j = 0; j < turns.size(); ++j) take(turns[j], rig.joints[j]);
   const FitModel model(rig, {});
+  const State state = state_of(fit, {});
   std::vector<std::vector<Linearised>> all;
-  for (ArmMotion& m : motions_) {
-    set_friction_speeds(m, rig);
-    all.push_back(model.linearised(state_, {&m, false}));
+  for (ArmMotion& m : motions) {
+    set_friction_turns(m, rig);
+    all.push_back(model.linearised(state, {&m, false}));
   }
-  const auto coulomb = std::find(rig.terms.begin(), rig.terms.end(), DriveTerm::coulomb) - rig.terms.begin();
   std::vector<Eigen::VectorXd> squares;
-  for (std::size_t j = 0; j < turns.size(); ++j) {
-    FrictionTurn unit = turns[j];
-    unit.torque = 1;
-    const DriveColumns own = columns_of(j, model, all, unit);
-    Eigen::MatrixXd h = signal::gram(own.columns);
-    h.diagonal() += (1e-9 * h.diagonal()).array().max(1e-300).matrix();  // terms that follow from others
-    const Eigen::VectorXd step =
-        signal::solve_symmetric(h, Eigen::VectorXd(own.columns.transpose() * own.residual));
-    const Eigen::VectorXd left = own.residual - own.columns * step;
-    squares.push_back(Eigen::VectorXd::Zero(own.blocks.empty() ? 0 : own.blocks.back() + 1));
-    for (Eigen::Index k = 0; k < left.size(); ++k)
-      squares.back()[own.blocks[std::size_t(k)]] += left[k] * left[k];
-    if (turns[j].distance > 0)
-      turns[j].torque = state_.drives(Eigen::Index(j), Eigen::Index(DriveTerm::coulomb)) + step[coulomb];
-  }
+  for (std::size_t j = 0; j < turns.size(); ++j) squares.push_back(squares_left(j, motions, all, rig, block));
   return squares;
 }
 
@@ -128,33 +87,23 @@ bool clearly_less(const Eigen::VectorXd& left, const Eigen::VectorXd& declared) 
 
 std::vector<FrictionTurn> friction_turns(const ArmFit& fit, std::vector<ArmMotion>& motions,
                                          const FitSettings& settings) {
-  const std::size_t joints = fit.rig.joints.size();
-  Turns tried(fit, motions, settings);
-  std::vector<FrictionTurn> declared(joints);
-  for (std::size_t j = 0; j < joints; ++j) declared[j].speed = fit.rig.friction_speed(j);
+  std::vector<FrictionTurn> declared;
+  for (std::size_t j = 0; j < fit.rig.joints.size(); ++j)
+    declared.push_back({fit.rig.friction_speed(j), fit.rig.joints[j].friction_distance});
   std::vector<FrictionTurn> best = declared;
-  const std::vector<Eigen::VectorXd> before = tried.left(declared);
+  const std::vector<Eigen::VectorXd> before = squares_left(fit, motions, declared, settings.block);
   std::vector<Eigen::VectorXd> least = before;
-  const auto look = [&](std::vector<FrictionTurn> turns) {
-    const std::vector<Eigen::VectorXd> left = tried.left(turns);
-    for (std::size_t j = 0; j < joints; ++j) {
-      const bool possible = turns[j].distance == 0 || (turns[j].torque > 0 && !has_path(fit.rig.joints[j]));
-      if (possible && left[j].sum() < least[j].sum() && clearly_less(left[j], before[j]))
+  const auto look = [&](const std::function<void(FrictionTurn&)>& change) {
+    std::vector<FrictionTurn> turns = declared;
+    for (FrictionTurn& turn : turns) change(turn);
+    const std::vector<Eigen::VectorXd> left = squares_left(fit, motions, turns, settings.block);
+    for (std::size_t j = 0; j < turns.size(); ++j)
+      if (left[j].sum() < least[j].sum() && clearly_less(left[j], before[j]))
         least[j] = left[j], best[j] = turns[j];
-    }
   };
-  for (const double octave : kOctaves) {
-    std::vector<FrictionTurn> turns = declared;
-    for (FrictionTurn& turn : turns) turn.speed *= octave;
-    look(turns);
-  }
-  if (std::find(fit.rig.terms.begin(), fit.rig.terms.end(), DriveTerm::coulomb) == fit.rig.terms.end())
-    return best;
-  for (const double path : kPaths) {
-    std::vector<FrictionTurn> turns = declared;
-    for (FrictionTurn& turn : turns) turn.distance = path;
-    look(turns);
-  }
+  for (const double octave : kOctaves) look([&](FrictionTurn& turn) { turn.speed *= octave; });
+  for (const double path : kPaths) look([&](FrictionTurn& turn) { turn.distance = path; });
+  for (ArmMotion& m : motions) set_friction_turns(m, fit.rig);
   return best;
 }
 
@@ -166,21 +115,19 @@ ArmFit fit_arm_and_friction_turns(ArmRig& rig, std::vector<ArmMotion>& motions, 
   const std::vector<FrictionTurn> turns = friction_turns(fit, motions, settings);
   std::vector<std::string> words;
   for (std::size_t j = 0; j < turns.size(); ++j) {
-    JointDrive& joint = rig.joints[j];
-    if (turns[j].distance > 0) {
-      words.push_back(
-          fmt::format("friction of {} builds up over {:.2g} rad after each reversal: presliding, "
-                      "which the rig file lacks",
-                      joint.name, turns[j].distance));
-      joint.effects.push_back(presliding(turns[j]));
-    } else if (turns[j].speed != rig.friction_speed(j)) {
+    const FrictionTurn declared{rig.friction_speed(j), rig.joints[j].friction_distance};
+    if (turns[j].distance != declared.distance)
+      words.push_back(fmt::format(
+          "friction of {} builds up over {:.2g} rad after each reversal (presliding), not {} as declared",
+          rig.joints[j].name, turns[j].distance, to_text(declared.distance)));
+    else if (turns[j].speed != declared.speed)
       words.push_back(fmt::format("friction of {} turns its sign within {:.3g} rad/s, not {:.3g} as declared",
-                                  joint.name, turns[j].speed, rig.friction_speed(j)));
-      joint.friction_speed = turns[j].speed;
-    }
+                                  rig.joints[j].name, turns[j].speed, declared.speed));
+    if (turns[j].distance != declared.distance || turns[j].speed != declared.speed)
+      take(turns[j], rig.joints[j]);
   }
   if (words.empty()) return fit;
-  for (ArmMotion& m : motions) set_friction_speeds(m, rig);
+  for (ArmMotion& m : motions) set_friction_turns(m, rig);
   fit = fit_arm(rig, fitted, {}, settings, progress);
   fit.warnings.insert(fit.warnings.end(), words.begin(), words.end());
   return fit;

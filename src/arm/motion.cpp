@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/arm/dynamics.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/model/presliding.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/record/sample_joiner.h"
 #include "backlash_diagnosis/record/time_base.h"
@@ -101,10 +102,23 @@ void set_kinematics(ArmMotion& m, const std::vector<record::Record>& joints, con
   }
 }
 
+/// Friction of one that builds up over a path, > 0 against forward motion.
+Eigen::ArrayXd built_up(const Eigen::VectorXd& speed, double interval, double distance) {
+  const std::vector<double> rate(speed.begin(), speed.end());
+  std::vector<double> way(rate.size(), 0.0);
+  for (std::size_t k = 1; k < way.size(); ++k) way[k] = way[k - 1] + 0.5 * interval * (rate[k - 1] + rate[k]);
+  const std::vector<model::FrictionLimits> one(way.size(), {1, 1, distance, 0});
+  return to_eigen(model::presliding_friction(way, one, rate, interval)).array();
+}
+
 Eigen::MatrixXd signs(const ArmMotion& m, const ArmRig& rig) {
   Eigen::MatrixXd out(m.motor_v.rows(), m.motor_v.cols());
-  for (Eigen::Index j = 0; j < out.cols(); ++j)
-    out.col(j) = (m.motor_v.col(j) / rig.friction_speed(std::size_t(j))).array().tanh();
+  for (Eigen::Index j = 0; j < out.cols(); ++j) {
+    const Eigen::VectorXd v = m.motor_v.col(j);
+    const Eigen::ArrayXd fast = (v / rig.friction_speed(std::size_t(j))).array().tanh();
+    const double distance = rig.joints[std::size_t(j)].friction_distance;
+    out.col(j) = distance > 0 ? Eigen::ArrayXd(fast.abs() * built_up(v, m.interval, distance)) : fast;
+  }
   return out;
 }
 
@@ -227,7 +241,7 @@ std::vector<ArmMotion> kinematics_of(const ArmRecord& record, const ArmRig& rig,
   return all;
 }
 
-void set_friction_speeds(ArmMotion& motion, const ArmRig& rig) {
+void set_friction_turns(ArmMotion& motion, const ArmRig& rig) {
   motion.sign = signs(motion, rig);
   for (std::size_t j = 0; j < motion.drive.size(); ++j)
     motion.drive[j].col(int(DriveTerm::coulomb)) = rows_of(motion.sign.col(Eigen::Index(j)), motion, rig);

@@ -92,7 +92,7 @@ void Tracer::set_base() {
     fits_.base.rig = rig_;
   else
     fits_.base = fit_arm_and_friction_turns(rig_, train_, settings_.fit);
-  for (ArmMotion& m : test_) set_friction_speeds(m, rig_);
+  for (ArmMotion& m : test_) set_friction_turns(m, rig_);
   for (const std::string& warning : fits_.base.warnings) trace_.warnings.push_back(warning);
   fits_.train_errors = relative_errors(fits_.base, {}, as_fitted(train_, false), settings_.fit.least_seconds);
   trace_.train = fits_.train_errors;

@@ -79,7 +79,13 @@ void ArmChanges::take(const FoundChainChange& found, const arm::ArmRecord& recor
   const double before = left(found);
   arm_->differ(difference_of(found, from_beginning, record.joints.front().time.back()), record);
   for (ArmJoint& joint : joints()) {
-    FoundChange beside{found.effect.at_joint(), found.from, found.to, {}, found.inflation, 0, {}};
+    FoundChange beside{found.effect.at_joint(),
+                       found.from,
+                       found.to,
+                       {},
+                       found.inflation,
+                       found.score.gain / found.inflation,
+                       {}};
     if (from_beginning) beside.from = 0;
     if (from_beginning && found.to == joint.search->blocks()) ++beside.to;
     joint.beside.push_back(beside);

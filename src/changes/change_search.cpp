@@ -261,12 +261,14 @@ void ChangeSearch::differ(FoundChange f) {
   first_.spread = with.spread;
 }
 
-/// A change of its own, not what the shape of an earlier one leaves.
+/// A change of its own, not what the shape of an earlier one leaves, of this joint or of its chain.
 bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChange>& found) const {
-  return std::none_of(found.begin(), found.end(), [&](const FoundChange& f) {
+  const auto leaves_it = [&](const FoundChange& f) {
     const double apart = std::fabs(double(next.from) - double(f.from)) * settings_.block;
     return apart < settings_.same_event && next.gain < settings_.least_beside * f.gain;
-  });
+  };
+  return std::none_of(found.begin(), found.end(), leaves_it) &&
+         std::none_of(beside_.begin(), beside_.end(), leaves_it);
 }
 
 /// A change that a later one takes back (same effect, opposite value) is one change with an end.

@@ -81,7 +81,10 @@ Stretch stretch_of(const arm::ArmRig& rig, const arm::ArmRecord& record, const a
 
 double motor_friction(const arm::ArmRig& rig, std::size_t joint, const DriveEffects& effects, double position,
                       double speed, double load, double way) {
-  const model::JointMoment now{0, position, speed, std::tanh(speed / rig.friction_speed(joint)), load, way};
+  const double distance = rig.joints[joint].friction_distance;
+  const double built_up = distance > 0 ? 1 - 2 * std::exp(-way / distance) : 1;
+  const double direction = std::tanh(speed / rig.friction_speed(joint)) * built_up;
+  const model::JointMoment now{0, position, speed, direction, load, way};
   return arm::drive_friction(rig.joints[joint], now) + effects.torque(now);
 }
 

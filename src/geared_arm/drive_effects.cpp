@@ -14,6 +14,8 @@ bool has_law(const arm::JointEffectSpec& spec) {
 }  // namespace
 
 DriveEffects::DriveEffects(const arm::ArmRig& rig, std::size_t joint) {
+  if (const double distance = rig.joints[joint].friction_distance; distance > 0)
+    bristles_.push_back({0, distance, 0});
   for (const arm::JointEffect& effect : rig.joints[joint].effects) {
     if (!effect.other.empty()) {
       const std::vector<std::string> names = rig.joint_names();

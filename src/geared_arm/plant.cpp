@@ -110,8 +110,10 @@ double ArmPlant::motor_friction(std::size_t joint, const double* state, double l
   const Drive& drive = drives_[joint];
   const std::size_t angle = motor_angle(joint);
   const double speed = state[std::size_t(angles_) + angle];
-  const model::JointMoment now{0, state[angle], speed, std::tanh(speed / arm_.rig.friction_speed(joint)),
-                               load};
+  const double fast = std::tanh(speed / arm_.rig.friction_speed(joint));
+  const double direction =
+      arm_.rig.joints[joint].friction_distance > 0 ? std::fabs(fast) * state[drive.bristles] : fast;
+  const model::JointMoment now{0, state[angle], speed, direction, load};
   double sum = arm::drive_friction(arm_.rig.joints[joint], now) + drive.effects.torque(now);
   for (std::size_t i = 0; i < drive.effects.bristles().size(); ++i) {
     const DriveEffects::Bristles& bristles = drive.effects.bristles()[i];

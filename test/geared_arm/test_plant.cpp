@@ -2,6 +2,7 @@
 // Arms with gears against energy, today's rig of one joint, KDL and statics.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "arm/arm_machines.h"
@@ -212,6 +213,7 @@ TEST(GearedArm, BristlesHoldAJointAsDahlSays) {
   const double friction = 2, distance = 0.01, torque = 1.2;
   arm.rig.joints[0].terms[std::size_t(arm::DriveTerm::coulomb)] = friction;
   arm.rig.joints[0].terms[std::size_t(arm::DriveTerm::viscous)] = 60;
+  GearedArm without = arm;
   arm.rig.joints[0].effects = {{"presliding", distance, "", {friction, 0}}};
   ArmPlant plant(arm);
   plant.set_torque(0, torque);
@@ -228,9 +230,47 @@ TEST(GearedArm, BristlesHoldAJointAsDahlSays) {
               bent - distance * std::log((1 + torque / friction) / (1 - torque / friction)) +
                   distance * std::log(1 + torque / friction),
               1e-6);
-  GearedArm without = arm;
-  without.rig.joints[0].effects.clear();
   EXPECT_THROW(plant.set_machine(without), InvalidParameter);
+}
+
+/// All dry friction of a drive builds up: the equation of arm_rig.h, by Runge and Kutta's method here.
+TEST(GearedArm, FrictionOfADriveBuildsUpOverItsDistance) {
+  GearedArm arm = free_arm();
+  arm.rig.chain.gravity.setZero();
+  arm.joints[0].gear.reset();
+  arm.joints[1].held = 0.3;
+  arm.joints[0].excitation = {};
+  arm.joints[0].excitation.type = "topic";
+  const double friction = 2, distance = 5e-3, slow = arm.rig.friction_speed(0);
+  GearedArm frictionless = arm;
+  arm.rig.joints[0].terms[std::size_t(arm::DriveTerm::coulomb)] = friction;
+  arm.rig.joints[0].friction_distance = distance;
+  ArmPlant plant(arm), free(frictionless);
+  free.set_torque(0, 1);
+  free.advance_to(1e-2);
+  const double inertia = 1e-2 / free.observe(0).motor_velocity;  // of all that turns with the joint
+  std::array<double, 3> x = {0, 0, 0};                           // angle, speed, bristles
+  const auto rate = [&](const std::array<double, 3>& s, double torque) {
+    return std::array<double, 3>{s[1],
+                                 (torque - friction * std::fabs(std::tanh(s[1] / slow)) * s[2]) / inertia,
+                                 (s[1] - std::fabs(s[1]) * s[2]) / distance};
+  };
+  const auto beside = [](const std::array<double, 3>& s, const std::array<double, 3>& r, double h) {
+    return std::array<double, 3>{s[0] + h * r[0], s[1] + h * r[1], s[2] + h * r[2]};
+  };
+  const double h = 1e-5;
+  for (const double torque : {5.0, -9.0, 8.0}) {
+    plant.set_torque(0, torque);
+    plant.advance_to(plant.time() + 0.1);
+    for (int i = 0; i < 10000; ++i) {
+      const auto a = rate(x, torque), b = rate(beside(x, a, h / 2), torque),
+                 c = rate(beside(x, b, h / 2), torque), d = rate(beside(x, c, h), torque);
+      for (std::size_t k = 0; k < 3; ++k) x[k] += h / 6 * (a[k] + 2 * b[k] + 2 * c[k] + d[k]);
+    }
+    EXPECT_NEAR(plant.observe(0).motor_position, x[0], 1e-7) << torque;
+    EXPECT_NEAR(plant.observe(0).motor_velocity, x[1], 1e-6) << torque;
+    EXPECT_GT(x[1] * torque, 0);  // so that it turns round twice
+  }
 }
 
 /// Friction that follows the load stands against a motor that is pushed slowly through its mesh: with the

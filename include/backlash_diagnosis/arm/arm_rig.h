@@ -4,10 +4,12 @@
 //   k_j s_j(t + d_j) = tau_j(q, v, a) + J_j a_j + friction_j + what `effects` say, see joint_effect.h
 //   friction_j = c_j S + b_j v + n_j v |v| + h_j v^3 + o_j + l_j S |tau_j|,   S = tanh(v / v_0)
 //
-// s_j is the recorded channel: a current with k_j [N m/A], or a torque with k_j = 1, the motor's or behind
-// the gear; later than the motion by d_j. tau_j is the chain's own torque, all at the joint's side of the
-// reduction. Friction that follows the load: e.g. Gautier and Jubien, IROS 2014; quadratic and cubic in
-// speed: what a lubricated gear shows beyond one line.
+// With a `friction_distance` x_s of the drive S builds up after a reversal as well (Dahl,
+// model/presliding.h): S = |tanh(v / v_0)| z, x_s dz/dt = v - |v| z. s_j is the recorded channel: a current
+// with k_j [N m/A], or a torque with k_j = 1, the motor's or behind the gear; later than the motion by d_j.
+// tau_j is the chain's own torque, all at the joint's side of the reduction. Friction that follows the load:
+// e.g. Gautier and Jubien, IROS 2014; quadratic and cubic in speed: what a lubricated gear shows beyond one
+// line.
 #pragma once
 
 #include <array>
@@ -43,6 +45,7 @@ struct JointDrive {
   double delay = 0;                  // d [s]
   std::vector<JointEffect> effects;  // that it shows beside the terms; as declared, never fitted
   double friction_speed = 0;         // v_0 of its own friction [rad/s]; 0: as of the whole rig
+  double friction_distance = 0;      // x_s [rad], over which it builds up; 0: at once
   record::ChannelMap channels;       // columns of a file with names of its own; none: the package's own names
   double training_error = 0;         // norm(r) / norm(s - mean(s)) where a fitted rig was fitted; 0: not said
 };

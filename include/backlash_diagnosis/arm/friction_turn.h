@@ -16,7 +16,6 @@ namespace backlash::arm {
 struct FrictionTurn {
   double speed = 0;     // v_0, rad/s
   double distance = 0;  // x_s, rad; 0: at once
-  double torque = 0;    // N m, that builds up over it: the dry friction of the drive
 };
 
 /// Of each joint: an octave about the rig's v_0, or a path, the one that leaves least of its torque, terms
@@ -27,8 +26,7 @@ std::vector<FrictionTurn> friction_turns(const ArmFit& fit, std::vector<ArmMotio
                                          const FitSettings& settings = {});
 
 /// fit_arm() of all that it may change, and where friction turns otherwise than the rig says, once more with
-/// that: `rig` and `motions` then have it, a path as effect `presliding` of the joint, and the fit's warnings
-/// say so. Throws as fit_arm().
+/// that: `rig` and `motions` then have it, and the fit's warnings say so. Throws as fit_arm().
 ArmFit fit_arm_and_friction_turns(ArmRig& rig, std::vector<ArmMotion>& motions,
                                   const FitSettings& settings = {}, const Progress& progress = nullptr);
 

@@ -10,7 +10,7 @@
 //   transmission_coupling         c u_i                      u_i: torque of the drive of joint i in the
 //                                                            model, as where the motor of a wrist sits on a
 //                                                            shaft that also turns this joint
-// Friction has the direction S = tanh(v / v_0) as there.
+// Friction has the direction S as there.
 #pragma once
 
 #include <Eigen/Core>

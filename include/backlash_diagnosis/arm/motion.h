@@ -54,8 +54,8 @@ std::vector<ArmMotion> kinematics_of(const ArmRecord& record, const ArmRig& rig,
                                      std::vector<std::string>& warnings);
 constexpr double kShortestStretch = 4;  // s; choice: some cycles of the slowest low-pass and of a motion
 
-/// S with the rig's v_0, and what a fit sees of it.
-void set_friction_speeds(ArmMotion& motion, const ArmRig& rig);
+/// S as the rig's friction turns, and what a fit sees of it.
+void set_friction_turns(ArmMotion& motion, const ArmRig& rig);
 
 /// The part of a motion with from <= time < to.
 ArmMotion part_of(const ArmMotion& motion, double from, double to);

@@ -30,6 +30,8 @@ class DriveEffects {
   struct Bristles {
     double torque = 0, distance = 0, damping = 0;  // damping [N m s/rad] of x_s dz/dt more, LuGre
   };
+  /// With a `friction_distance` of the joint the first, without torque of its own, has the direction z of
+  /// all.
   const std::vector<Bristles>& bristles() const { return bristles_; }
   /// Other joints, and the share of their drives' torque that this one has to supply.
   const std::vector<std::pair<std::size_t, double>>& couplings() const { return couplings_; }
