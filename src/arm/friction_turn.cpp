@@ -39,7 +39,7 @@ Eigen::VectorXd squares_left(std::size_t joint, const std::vector<ArmMotion>& mo
   for (std::size_t i = 0; i < motions.size(); ++i, ++number) {
     const ArmMotion& m = motions[i];
     const Linearised& l = all[i][joint];
-    double begin = m.time[m.rows.front()];
+    double begin = m.rows.empty() ? 0 : m.time[m.rows.front()];
     for (Eigen::Index k = 0; k < m.counts.rows(); ++k) {
       const double t = m.time[m.rows[std::size_t(k)]];
       if (t >= begin + block) begin = t, ++number;
