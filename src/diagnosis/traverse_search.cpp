@@ -17,6 +17,8 @@ constexpr int kSearched = 16;  // windows of a first guess
 constexpr int kSearch = 20;    // steps of one
 // Spreads: whether the load bounces, and whether its weight keeps it on one flank, decides where fits end.
 constexpr double kBounces[] = {-1.5, 0, 1.5}, kMoreWeight = 1.5;
+// Of a window, by the motor alone: its later touches decide where a fit ends that begins far away. Choice.
+constexpr double kBrief = 0.7;
 // Theory: of a cost of some thousand, a hundredth of a standard error.
 constexpr double kConverged = 1e-7;
 constexpr double kBeside[] = {0.7, 1.4};  // times the gap of a fit, from which others begin
@@ -111,13 +113,20 @@ Fits traverse_guesses(const TraverseData& data, const GapTraverseSettings& setti
   for (const double gap : gaps)
     for (const double damping : dampings)
       for (const double term : terms) {
-        fits.emplace_back(data, settings, few, from, noise);
+        fits.emplace_back(data, settings, few, from, noise, data.load.empty() ? kBrief : 1);
         const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
         fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
         fits.back().fit.shared[kTraverseDamping] += damping;
         fits.back().fit.shared[kTraverseLoadTerms] += term;
       }
-  return run_some(std::move(fits));
+  fits = run_some(std::move(fits));
+  if (!data.load.empty()) return fits;
+  Fits whole;
+  for (const TraverseFit& fit : fits) {
+    whole.emplace_back(data, settings, few, fit.fit.shared, noise);
+    whole.back().begin_with_own_of(fit);
+  }
+  return run_some(std::move(whole));
 }
 
 Fits nearer(Fits fits) {

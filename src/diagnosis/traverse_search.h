@@ -23,8 +23,8 @@ struct TraverseFit {
   fit::WindowedFit fit;
 
   TraverseFit(const TraverseData& data, const GapTraverseSettings& settings, std::vector<TraverseWindow> some,
-              const Eigen::VectorXd& shared, double of_noise)
-      : windows(std::make_unique<TraverseWindows>(data, settings, std::move(some))), fit(*windows) {
+              const Eigen::VectorXd& shared, double of_noise, double part = 1)
+      : windows(std::make_unique<TraverseWindows>(data, settings, std::move(some), part)), fit(*windows) {
     windows->noise = of_noise;
     fit.shared = shared;
   }

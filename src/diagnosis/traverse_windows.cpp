@@ -109,22 +109,23 @@ double unknown_law(const TraverseData& data, const GapTraverseSettings& s) {
 }
 
 TraverseWindows::TraverseWindows(const TraverseData& data, const GapTraverseSettings& settings,
-                                 std::vector<TraverseWindow> windows)
+                                 std::vector<TraverseWindow> windows, double part)
     : data_(data),
       windows_(std::move(windows)),
       shared_(shared_priors(data, settings)),
       own_(own_priors(data, settings)) {
-  for (const TraverseWindow& window : windows_) weights_.push_back(weights_of(window));
+  for (const TraverseWindow& window : windows_) weights_.push_back(weights_of(window, part));
 }
 
 /// What is left of a torque has three parts: its noise, of which two samples are averaged; that of the
 /// position, which two differences make large and fast; and a slow torque that nothing shows. The noise of
 /// the position comes in as a factor of the motor's inertia, which would be fitted too small where it counted
 /// as much as it is: its fast part is all but left out.
-TraverseWindows::Weights TraverseWindows::weights_of(const TraverseWindow& window) const {
+TraverseWindows::Weights TraverseWindows::weights_of(const TraverseWindow& window, double part) const {
   Weights w;
+  const auto samples = Index(std::lround(part * double(data_.samples)));
   if (by_load()) {
-    for (Index k = 0; k < Index(data_.samples); ++k)
+    for (Index k = 0; k < samples; ++k)
       if (data_.load_counts[window.first + std::size_t(k)]) w.counted.push_back(k);
     w.of_noise = double(w.counted.size());
     return w;
@@ -134,7 +135,7 @@ TraverseWindows::Weights TraverseWindows::weights_of(const TraverseWindow& windo
   const double white = data_.torque_noise * data_.torque_noise, blue = differences * differences,
                slow = kSlowTorque * data_.level * kSlowTorque * data_.level;
   const double kBlue[] = {6, -4, 1}, kHeldNoise[] = {0.5, 0.25, 0};
-  for (Index k = 1; k + 1 < Index(data_.samples); ++k)
+  for (Index k = 1; k + 1 < samples; ++k)
     if (data_.counts[window.first + std::size_t(k)]) w.counted.push_back(k);
   const auto count = Index(w.counted.size());
   MatrixXd own_noise(count, count), all(count, count);

@@ -18,9 +18,9 @@ double unknown_law(const TraverseData& data, const GapTraverseSettings& settings
 
 class TraverseWindows : public fit::Windows {
  public:
-  /// `data` must outlive it.
+  /// `data` must outlive it. `part`: of each window, from its begin on, that counts.
   TraverseWindows(const TraverseData& data, const GapTraverseSettings& settings,
-                  std::vector<TraverseWindow> windows);
+                  std::vector<TraverseWindow> windows, double part = 1);
 
   double noise = 1;  ///< times that of a sample, as which what is left counts
 
@@ -49,7 +49,7 @@ class TraverseWindows : public fit::Windows {
 
   bool by_load() const { return !data_.load.empty(); }
   bool moves_load(int value) const;
-  Weights weights_of(const TraverseWindow& window) const;
+  Weights weights_of(const TraverseWindow& window, double part) const;
   TraverseRun run_of(int w, const Eigen::MatrixXd& shared, const Eigen::MatrixXd& own,
                      Eigen::Index column) const;
 
