@@ -5,11 +5,12 @@
 //   friction_j = c_j S + b_j v + n_j v |v| + h_j v^3 + o_j + l_j S |tau_j|,   S = tanh(v / v_0)
 //
 // With a `friction_distance` x_s of the drive S builds up after a reversal as well (Dahl,
-// model/presliding.h): S = |tanh(v / v_0)| z, x_s dz/dt = v - |v| z. s_j is the recorded channel: a current
-// with k_j [N m/A], or a torque with k_j = 1, the motor's or behind the gear; later than the motion by d_j.
-// tau_j is the chain's own torque, all at the joint's side of the reduction. Friction that follows the load:
-// e.g. Gautier and Jubien, IROS 2014; quadratic and cubic in speed: what a lubricated gear shows beyond one
-// line.
+// model/presliding.h): S = |tanh(v / v_0)| z, x_s dz/dt = v - |v| z.
+//
+// s_j is the recorded channel: a current with k_j [N m/A], or a torque with k_j = 1, the motor's or behind
+// the gear; later than the motion by d_j. tau_j is the chain's own torque, all at the joint's side of the
+// reduction. Friction that follows the load: e.g. Gautier and Jubien, IROS 2014; quadratic and cubic in
+// speed: what a lubricated gear shows beyond one line.
 #pragma once
 
 #include <array>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How dry friction of a drive turns its sign at a reversal, estimated from records: within v_0 of arm_rig.h,
-// or over a path x_s of the bristles of its teeth and bearings (Dahl, see model/presliding.h).
+// and where that shows over a path x_s of the bristles of its teeth and bearings (Dahl, see
+// model/presliding.h).
 //
 // Of a v_0 that is not the machine's, c (S' - S) is left about each reversal, c being Coulomb friction. Other
 // effects of low speed have nearly that shape: exp(-(v / w_s)^2) S with w_s near v_0 passes for it, so that

@@ -24,14 +24,12 @@ class DriveEffects {
   double torque(const model::JointMoment& now) const;
   /// The motor's torque over what is recorded of it.
   double gain() const { return gain_; }
-  /// Friction `torque` [N m] that builds up over `distance` x_s [rad] (Dahl, model/presliding.h): z of it is
-  /// there, with x_s dz/dt = v - |v| z, in place of the share S of the direction that all other dry friction
-  /// has.
+  /// Friction `torque` [N m] that builds up over `distance` x_s [rad] (Dahl, model/presliding.h): its share z
+  /// acts, x_s dz/dt = v - |v| z, where of all other dry friction the share S acts.
   struct Bristles {
     double torque = 0, distance = 0, damping = 0;  // damping [N m s/rad] of x_s dz/dt more, LuGre
   };
-  /// With a `friction_distance` of the joint the first, without torque of its own, has the direction z of
-  /// all.
+  /// With a `friction_distance` of the joint the first has no torque of its own: its z is that of S.
   const std::vector<Bristles>& bristles() const { return bristles_; }
   /// Other joints, and the share of their drives' torque that this one has to supply.
   const std::vector<std::pair<std::size_t, double>>& couplings() const { return couplings_; }
