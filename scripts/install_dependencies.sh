@@ -10,6 +10,7 @@ set -euo pipefail
 build=(
   build-essential ccache cmake ninja-build                        # compiler and build
   catkin ros-core-dev                                             # ROS 1: build system, roscpp, rosbag, messages
+  python3-numpy                                                   # the generators of messages import it where it is
   libactionlib-dev libdiagnostic-updater-dev                      # ROS 1 libraries outside the core
   libdynamic-reconfigure-config-init-mutex-dev python3-dynamic-reconfigure
   libboost-dev libboost-program-options-dev libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev
@@ -23,7 +24,7 @@ run=(
   python3-actionlib python3-actionlib-msgs python3-diagnostic-msgs python3-sensor-msgs python3-std-srvs
   libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node, for monitoring.launch; the plugins are in -dev
   ros-robot-state-publisher                                       # arm.launch
-  python3-matplotlib python3-numpy python3-yaml                   # plots
+  python3-matplotlib python3-yaml                                 # plots
   python3-aiohttp python3-rospy                                   # dashboard
   python3-cryptography python3-distributed                        # fleet_report: Dask, with TLS between its processes
 )
