@@ -70,9 +70,21 @@ void check_stamps(RecordLook& look) {
   const std::vector<double>& time = look.record.time;
   const std::vector<std::size_t> rows = rows_of_samples(time, look.interval);
   Lost lost;
+  for (const ClockStep& step : look.record.clock_steps) {
+    look.say(
+        FindingKind::clock_step, "time", step.time, step.time, 1, Consequence::cut,
+        fmt::format("time: goes back by {:.4g} s: the clock was set, or recordings were joined; what follows "
+                    "counts on from {:.6g} s, used is what lies on one side",
+                    step.back, step.time));
+    look.cuts.push_back({step.time, step.time});
+  }
+  const auto is_set_back = [&](double t) {
+    return std::any_of(look.record.clock_steps.begin(), look.record.clock_steps.end(),
+                       [t](const ClockStep& step) { return step.time == t; });
+  };
   for (std::size_t i = 0; i + 1 < time.size(); ++i) {
     const std::size_t missing = rows[i + 1] - rows[i] - 1;
-    if (missing == 0) continue;
+    if (missing == 0 || is_set_back(time[i + 1])) continue;
     if (is_clock_step(look, i)) {
       look.say(
           FindingKind::clock_step, "time", time[i], time[i + 1], 1, Consequence::cut,

@@ -84,16 +84,20 @@ ParsedNumber StampReader::read(std::string_view text) {
 bool RowTimes::accept(double stamp, const std::string& name, std::string_view text, const Place& place) {
   switch (stamps_.next(stamp)) {
     case StampVerdict::accept:
-      times.push_back(stamp);
-      return true;
+      break;
     case StampVerdict::repeated:
       if (first_repeated_.empty()) first_repeated_ = place.text(place.number());
       return false;
     case StampVerdict::backwards:
-      break;
+      if (!stamps_.resume(stamp)) fail_back(name, text, place);
   }
+  times.push_back(stamp + stamps_.offset());
+  return true;
+}
+
+void RowTimes::fail_back(const std::string& name, std::string_view text, const Place& place) const {
   place.fail(printable(name) + " = " + in_quotes(text) + ": goes back, the row before has " +
-             to_text(stamps_.last()) + " s: give what follows as a file of its own");
+             to_text(stamps_.last() - stamps_.offset()) + " s: give what follows as a file of its own");
 }
 
 std::vector<std::string> RowTimes::warnings() const {

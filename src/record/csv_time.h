@@ -44,7 +44,7 @@ class StampReader {
 /// Stamps that increase, row by row.
 class RowTimes {
  public:
-  /// False for a repeated stamp, whose row is dropped; throws BadData for one that goes back.
+  /// False for a repeated stamp, whose row is dropped; throws BadData for one out of order.
   bool accept(double stamp, const std::string& name, std::string_view text, const Place& place);
 
   std::vector<double> times;
@@ -52,6 +52,8 @@ class RowTimes {
   const StampChecker& stamps() const { return stamps_; }
 
  private:
+  [[noreturn]] void fail_back(const std::string& name, std::string_view text, const Place& place) const;
+
   StampChecker stamps_;
   std::string first_repeated_;  // where
 };

@@ -275,8 +275,8 @@ Record MappedRows::finish() {
     record_.warnings.push_back(
         std::to_string(left_out_) + (left_out_ == 1 ? " row has" : " rows have") +
         " no number in a column that is read and are left out; the first: " + first_left_out_);
-  rows_.stamps().count_into(record_);
   record_.time = std::move(rows_.times);
+  rows_.stamps().count_into(record_);
   if (clock_) record_.origin = clock_->origin();
   return std::move(record_);
 }

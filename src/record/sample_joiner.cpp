@@ -94,6 +94,12 @@ SampleJoiner::Sample sample_of(const Record& record, std::size_t i) {
 }  // namespace
 
 Record joined(const std::vector<Record>& parts) {
+  for (const Record& part : parts)
+    if (!part.clock_steps.empty())
+      throw BadData(part.name,
+                    fmt::format("its stamps go back by {:.4g} s at {:.6g} s: of several topics with a "
+                                "clock that was set the times in common are not known",
+                                part.clock_steps.front().back, part.clock_steps.front().time));
   SampleJoiner joiner(parts.size());
   Record all;
   all.name = parts.front().name;
@@ -132,6 +138,7 @@ void set_origin(Record& record, double origin) {
   if (later != 0)
     for (double& time : record.time) time += later;
   record.first_repeated_stamp += later;
+  for (ClockStep& step : record.clock_steps) step.time += later;
   record.origin = origin;
 }
 

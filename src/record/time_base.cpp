@@ -35,6 +35,7 @@ std::string time_text(double time) {
 
 StampVerdict StampChecker::next(double stamp) {
   if (!std::isfinite(stamp)) throw InvalidParameter("time", stamp, "must be finite");
+  stamp += offset_;
   if (accepted_ > 0 && stamp <= last_) {
     if (stamp < last_ && !(last_ - stamp < kGapFactor * std::min(intervals_[0], intervals_[1])))
       return StampVerdict::backwards;
@@ -47,9 +48,18 @@ StampVerdict StampChecker::next(double stamp) {
   return StampVerdict::accept;
 }
 
+bool StampChecker::resume(double stamp) {
+  if (double(accepted_ - (steps_.empty() ? 0 : steps_.back().sample)) < kGapFactor) return false;
+  steps_.push_back({accepted_++, last_ - offset_ - stamp});
+  last_ += 2 * kGapFactor * std::max(intervals_[0], intervals_[1]);  // a gap, whatever the usual interval
+  offset_ = last_ - stamp;
+  return true;
+}
+
 void StampChecker::count_into(Record& record) const {
   record.repeated_stamps = repeated_;
   record.first_repeated_stamp = first_repeated_;
+  for (const Step& step : steps_) record.clock_steps.push_back({record.time.at(step.sample), step.back});
 }
 
 std::string StampChecker::describe(const std::string& where) const {

@@ -128,11 +128,12 @@ class JointRun {
       case record::StampVerdict::repeated:
         return false;
       case record::StampVerdict::backwards:
+        if (stamps_.resume(since_first_.seconds(stamp))) break;
         fail_at(index, "header.stamp = " + stamp_text(stamp) + " s is before " + stamp_text(last_stamp_) +
-                           " s of the message before: a looped or merged recording, or a clock that jumped");
+                           " s of the message before: several publishers, or a merged recording");
     }
     last_stamp_ = stamp;
-    record_.time.push_back(clock_.seconds(stamp));
+    record_.time.push_back(clock_.seconds(stamp) + stamps_.offset());
     return true;
   }
 

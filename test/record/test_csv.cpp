@@ -225,6 +225,18 @@ TEST(Csv, RepeatedStampsLoseTheLaterRowWithOneWarning) {
             "3 repeated time stamps: the later sample dropped; first at line 4, time = 1 s");
 }
 
+// Two recordings behind one another. What is out of order within ten rows is refused: see above.
+TEST(Csv, RowsWhoseClockBeginsAnewCountOn) {
+  std::string text = kHeader;
+  for (int k = 0; k < 24; ++k) text += std::to_string(k % 12) + ',' + std::to_string(k) + '\n';
+  const Record record = parse(text);
+  ASSERT_EQ(record.size(), 24u);
+  ASSERT_EQ(record.clock_steps.size(), 1u);
+  EXPECT_EQ(record.clock_steps[0].time, record.time[12]);
+  EXPECT_EQ(record.clock_steps[0].back, 11);
+  EXPECT_EQ(record.time[23] - record.time[12], 11);
+}
+
 TEST(Csv, GapsAndJitterAreReported) {
   const Record gap = parse(kHeader + "0,1\n1,1\n2,1\n3,1\n33,1\n34,1\n");
   EXPECT_EQ(

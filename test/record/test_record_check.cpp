@@ -133,6 +133,18 @@ TEST(RecordCheck, DistinguishesAStepOfTheClockFromLostSamples) {
   EXPECT_EQ(checked.check.usable.size(), 2u);
 }
 
+TEST(RecordCheck, CutsWhereTheStampsOfTheFileWentBack) {
+  const auto stamped = [](int k) { return k * kInterval + (k > 5000 ? 0.5 : 0); };
+  Record r = recorded([](int k) { return k * kInterval + (k > 5000 ? 7 : 0); }, stamped);  // another motion
+  r.clock_steps = {{r.time[5001], 3}};
+  const CheckedRecord checked = check_record(r, servo());
+  const Finding* const step = find(checked.check, FindingKind::clock_step);
+  ASSERT_NE(step, nullptr) << messages(checked.check);
+  EXPECT_EQ(find(checked.check, FindingKind::lost_samples), nullptr) << messages(checked.check);
+  ASSERT_EQ(checked.check.usable.size(), 2u);
+  EXPECT_NEAR(checked.check.usable[1].from, 5001 * kInterval + 0.5, 1e-9);
+}
+
 /// Uniform, of so much of an interval to either side.
 std::vector<double> jitter(double share) {
   Random random(5);

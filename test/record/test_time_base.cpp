@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/record/time_base.h"
 
 namespace backlash::record {
@@ -48,6 +49,31 @@ TEST(StampChecker, AStampThatGoesBackByLessThanAGapLosesItsSample) {
   EXPECT_EQ(stamps.next(90.5), StampVerdict::repeated);
   EXPECT_EQ(stamps.next(90), StampVerdict::backwards);
   EXPECT_EQ(stamps.repeated(), 3u);
+}
+
+// Ten samples make a clock; one that is set anew after fewer is no clock.
+TEST(StampChecker, CountsOnFromAClockThatWasSet) {
+  StampChecker stamps;
+  for (int k = 0; k < 10; ++k) {
+    EXPECT_FALSE(stamps.resume(-100)) << k;
+    stamps.next(100 + k);
+  }
+  EXPECT_EQ(stamps.next(3), StampVerdict::backwards);
+  EXPECT_TRUE(stamps.resume(3));
+  const double there = stamps.last();
+  EXPECT_GT(there, 109 + kGapFactor);
+  EXPECT_EQ(there, 3 + stamps.offset());
+  EXPECT_EQ(stamps.next(3), StampVerdict::repeated);
+  EXPECT_EQ(stamps.next(4), StampVerdict::accept);
+  EXPECT_EQ(stamps.last(), there + 1);
+  EXPECT_FALSE(stamps.resume(-50));
+  Record record;
+  record.time.resize(stamps.accepted());
+  record.time[10] = there;
+  stamps.count_into(record);
+  ASSERT_EQ(record.clock_steps.size(), 1u);
+  EXPECT_EQ(record.clock_steps[0].time, there);
+  EXPECT_EQ(record.clock_steps[0].back, 106);
 }
 
 TEST(StampChecker, TheFirstStampMayBeZero) {

@@ -99,8 +99,23 @@ TEST_F(BagRecord, ChannelThatIsNanAtTimesIsPassedOn) {
 TEST_F(BagRecord, StampThatGoesBackIsRefused) {
   Recording(file("a.bag")).add(Recording::motor(1)).add(Recording::motor(2)).add(Recording::motor(1.5));
   const std::string message = message_of<BadData>([&] { read_bag(file("a.bag")); });
-  for (const char* part : {"/joint_states message 2", "1.500000000", "2.000000000", "looped"})
+  for (const char* part : {"/joint_states message 2", "1.500000000", "2.000000000", "merged"})
     expect_contains(message, part);
+}
+
+// As of a loop, or of a clock that was set: what comes later has its place in the record, behind a gap.
+TEST_F(BagRecord, StampsThatBeginAgainCountOn) {
+  {
+    Recording recording(file("a.bag"));
+    for (int k = 0; k < 40; ++k) recording.add(Recording::motor(5 + 0.25 * (k % 20), k));
+  }
+  const record::Record record = read_bag(file("a.bag"));
+  ASSERT_EQ(record.size(), 40u);
+  ASSERT_EQ(record.clock_steps.size(), 1u);
+  EXPECT_EQ(record.clock_steps[0].time, record.time[20]);
+  EXPECT_EQ(record.clock_steps[0].back, 4.75);
+  EXPECT_GT(record.time[20] - record.time[19], record::kGapFactor * 0.25);
+  EXPECT_EQ(record.time[39] - record.time[20], 4.75);
 }
 
 TEST_F(BagRecord, RepeatedStampLosesTheLaterMessageWithAWarning) {

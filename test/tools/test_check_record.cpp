@@ -68,6 +68,23 @@ TEST_F(CheckRecord, NeedsNoRigFileAndNoOutput) {
   EXPECT_NE(outcome.out.find("identify: yes"), std::string::npos) << outcome.out;
 }
 
+// The clock is set back by 100 s after 1.5 s: the longer part is used, and says the same as alone.
+TEST_F(CheckRecord, AClockThatWasSetBackCutsTheRecord) {
+  simulate("NR > 1 && $1 >= 1.5 { $1 -= 100 } 1");
+  EXPECT_EQ(look().code, 1);
+  const Json step = finding("clock_step");
+  ASSERT_FALSE(step.is_null()) << json()["findings"];
+  EXPECT_NE(step["message"].get<std::string>().find("goes back by 100 s"), std::string::npos) << step;
+  EXPECT_TRUE(finding("lost_samples").is_null());
+  EXPECT_EQ(shell("awk -F, 'NR == 1 || $1 < -90' a.csv > b.csv; true").code, 0);
+  const auto play = [&](const std::string& file) {
+    done("identify " + file + " --rig '" + test::package_file("config/two_inertia_servo.yaml") +
+         "' --out y.yaml --json y.json");
+    return Json::parse(read("y.json"))["parameters"]["backlash_angle"]["value"].get<double>();
+  };
+  EXPECT_NEAR(play("a.csv") / play("b.csv"), 1, 1e-6);  // but for rounding of the times
+}
+
 // A vector picture has its texts as comments. Seconds 2 to 3 of the load's encoder stand still.
 TEST_F(CheckRecord, PlotShowsWhatIsWrongAtItsPlace) {
   simulate("NR > 1 && $1 >= 2 && $1 < 3 { $5 = held } { held = $5 } 1");

@@ -52,6 +52,11 @@ struct Stretch {
   double duration() const { return to - from; }
 };
 
+/// Where the stamps of a file went back; times count on from there, after a gap.
+struct ClockStep {
+  double time = 0, back = 0;  ///< s, of the first sample after it, and by how much
+};
+
 /// A record: `time` in seconds, strictly increasing, and one column of the same length per channel present.
 class Record {
  public:
@@ -61,6 +66,7 @@ class Record {
   double origin = 0;                  ///< s since 1970 of time 0; 0 where `time` is as in the file
   std::size_t repeated_stamps = 0;    ///< samples that the reader dropped, as their stamp was that before
   double first_repeated_stamp = 0;    ///< s, valid where repeated_stamps > 0
+  std::vector<ClockStep> clock_steps;
   /// s, standard deviation of when the samples were taken about `time`; NaN: nobody looked
   /// (record/even_grid.h).
   double unsure_time = std::numeric_limits<double>::quiet_NaN();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What is allowed in a time base, and what is said about it. One policy for CSV, bags and live topics: a
-// stamp that goes back by more than a gap is long is refused, one that repeats or goes back by less loses the
-// later sample, gaps and jitter are kept and reported.
+// stamp that repeats or goes back by less than a gap is long loses the later sample, gaps and jitter are kept
+// and reported. One that goes back by more is a clock that was set: a reader goes on from there, a live topic
+// begins anew.
 #pragma once
 
 #include <cstddef>
@@ -26,12 +27,17 @@ class StampChecker {
   /// `stamp` in seconds; throws InvalidParameter when it is not finite.
   StampVerdict next(double stamp);
 
-  double last() const { return last_; }  ///< s, the stamp accepted last; 0 before the first
+  /// Accepts a stamp that went backwards: it and those after it are `offset` later, after a gap. False, and
+  /// nothing changes, where fewer than kGapFactor were accepted since the clock was set before: out of order.
+  bool resume(double stamp);
+
+  double offset() const { return offset_; }  ///< s, from stamps to times
+  double last() const { return last_; }      ///< s, the time accepted last; 0 before the first
   std::size_t accepted() const { return accepted_; }
   std::size_t repeated() const { return repeated_; }
   double first_repeated() const { return first_repeated_; }  ///< s, valid where repeated() > 0
 
-  /// Adds what was dropped to the counts of a record.
+  /// Adds what was dropped, and where the clock was set, to a record that has its times.
   void count_into(Record& record) const;
 
   /// Warning for Record::warnings, empty where nothing was dropped; `where` names the place ("line 17") if
@@ -41,6 +47,12 @@ class StampChecker {
  private:
   double last_ = 0, first_repeated_ = 0;
   double intervals_[2] = {0, 0};  // the last two
+  double offset_ = 0;
+  struct Step {
+    std::size_t sample;
+    double back;  // s
+  };
+  std::vector<Step> steps_;
   std::size_t accepted_ = 0, repeated_ = 0;
 };
 
