@@ -64,9 +64,8 @@ check nightly_list nightly_list_is_whole
 # Tests that measure rates mostly wait: what else there is to do gets the time that they leave.
 run_tests rostests_alone 1 0 "${alone[@]}" &
 rates=$!
-GTEST_FILTER="-$(nightly_tests)" run_tests gtests "$(nproc)" 19 "run_tests_${PACKAGE}_gtest" ||
-  outside+=(--failed "run_gtests: the run broke off")
-run_tests rostests_beside_others 3 19 "${beside[@]}" || outside+=(--failed "run_rostests_beside_others: the run broke off")
+GTEST_FILTER="-$(nightly_tests)" run_tests tests_beside_others $(($(nproc) + 1)) 19 "run_tests_${PACKAGE}_gtest" "${beside[@]}" ||
+  outside+=(--failed "run_tests_beside_others: the run broke off")
 
 echo "Checking style, documentation, installation and faults"
 check catkin_lint catkin_lint --strict "${REPO}"

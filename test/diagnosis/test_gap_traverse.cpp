@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <tuple>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/random.h"
@@ -110,22 +111,25 @@ TEST(GapTraverse, LostSamplesAreMissingRows) {
 }
 
 // The load's encoder is set at any angle, eccentric and late; the torque is not asked for.
-TEST(GapTraverse, EstimatesThePlayFromBothEncoders) {
-  for (const double gap : {3e-4, 5e-4, 1.5e-3})
-    for (const double eccentricity : {0.0, 2e-4}) {
-      Servo servo;
-      servo.gap = gap, servo.load_step = 7e-6, servo.eccentricity = eccentricity, servo.skew = eccentricity;
-      record::Record record = servo.record();
-      record.column(record::Channel::motor_torque).clear();
-      // Tolerance: the law of the teeth is free between lines and points, a fifth of the deflection of 0.7
-      // mrad at most.
-      const Estimate e = estimate_gap_traverse(record, declared());
-      ASSERT_EQ(e.status, Status::ok) << e.message;
-      EXPECT_LE(e.angle_lower, gap) << e.message;
-      EXPECT_GE(e.angle_upper, gap) << e.message;
-      EXPECT_NEAR(e.backlash_angle, gap, 1.4e-4) << e.message;
-    }
+class GapTraverseOfBothEncoders : public testing::TestWithParam<std::tuple<double, double>> {};
+
+TEST_P(GapTraverseOfBothEncoders, EstimatesThePlay) {
+  const auto [gap, eccentricity] = GetParam();
+  Servo servo;
+  servo.gap = gap, servo.load_step = 7e-6, servo.eccentricity = eccentricity, servo.skew = eccentricity;
+  record::Record record = servo.record();
+  record.column(record::Channel::motor_torque).clear();
+  // Tolerance: the law of the teeth is free between lines and points, a fifth of the deflection of 0.7 mrad
+  // at most.
+  const Estimate e = estimate_gap_traverse(record, declared());
+  ASSERT_EQ(e.status, Status::ok) << e.message;
+  EXPECT_LE(e.angle_lower, gap) << e.message;
+  EXPECT_GE(e.angle_upper, gap) << e.message;
+  EXPECT_NEAR(e.backlash_angle, gap, 1.4e-4) << e.message;
 }
+
+INSTANTIATE_TEST_SUITE_P(Servos, GapTraverseOfBothEncoders,
+                         testing::Combine(testing::Values(3e-4, 5e-4, 1.5e-3), testing::Values(0.0, 2e-4)));
 
 TEST(GapTraverse, HoldsForTeethAfterHertzWithBothEncoders) {
   Servo servo;
@@ -149,15 +153,16 @@ TEST(GapTraverse, APlayThatStepsIsNeitherOfThemAlone) {
 }
 
 // One flank is pressed throughout: its deflection says nothing of the other.
-TEST(GapTraverse, OneFlankAloneIsNoPlay) {
+class GapTraverseUnderAWeight : public testing::TestWithParam<double> {};
+
+TEST_P(GapTraverseUnderAWeight, OneFlankAloneIsNoPlay) {
   Servo servo;
-  servo.load_step = 7e-6;
-  for (const double gravity : {600.0, 1500.0}) {
-    servo.gravity = gravity;
-    const Estimate e = estimate_gap_traverse(servo.record(), declared());
-    EXPECT_NE(e.status, Status::ok) << e.backlash_angle << " " << e.message;
-  }
+  servo.load_step = 7e-6, servo.gravity = GetParam();
+  const Estimate e = estimate_gap_traverse(servo.record(), declared());
+  EXPECT_NE(e.status, Status::ok) << e.backlash_angle << " " << e.message;
 }
+
+INSTANTIATE_TEST_SUITE_P(Servos, GapTraverseUnderAWeight, testing::Values(600.0, 1500.0));
 
 // A declared weight, a third larger than declared, leaves the other flank a part of the time: what the record
 // says of it counts, and not that it might be larger still.
@@ -190,16 +195,20 @@ TEST(GapTraverse, HoldsInSmoothMotionWithMoreFrictionThanDeclared) {
   expect_gap(servo, estimate_gap_traverse(servo.record(), declared()));
 }
 
-TEST(GapTraverse, NoPlayIsNotReportedAsSome) {
-  for (const double gap : {0.0, 1e-5})
-    for (const double step : {8.7e-7, 1.4e-5}) {  // 12 bits behind 110 : 1
-      Servo servo;
-      servo.gap = gap, servo.step = step, servo.duration = 10;
-      const Estimate e = estimate_gap_traverse(servo.record(), declared());
-      EXPECT_TRUE(e.status != Status::ok || (e.angle_lower <= gap && gap <= e.angle_upper))
-          << e.message << " " << e.angle_lower << " to " << e.angle_upper;
-    }
+class GapTraverseOfNoPlay : public testing::TestWithParam<std::tuple<double, double>> {};
+
+TEST_P(GapTraverseOfNoPlay, IsNotReportedAsSome) {
+  Servo servo;
+  std::tie(servo.gap, servo.step) = GetParam();
+  servo.duration = 10;
+  const Estimate e = estimate_gap_traverse(servo.record(), declared());
+  EXPECT_TRUE(e.status != Status::ok || (e.angle_lower <= servo.gap && servo.gap <= e.angle_upper))
+      << e.message << " " << e.angle_lower << " to " << e.angle_upper;
 }
+
+INSTANTIATE_TEST_SUITE_P(Servos, GapTraverseOfNoPlay,
+                         testing::Combine(testing::Values(0.0, 1e-5),
+                                          testing::Values(8.7e-7, 1.4e-5)));  // 12 bits behind 110 : 1
 
 TEST(GapTraverse, HoldsForTeethAfterHertz) {
   for (const double noise : {2.0, 60.0}) {

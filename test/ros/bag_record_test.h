@@ -6,7 +6,7 @@
 #include <rosbag/bag.h>
 #include <sensor_msgs/JointState.h>
 #include <std_msgs/String.h>
-#include <stdlib.h>  // mkdtemp
+#include <stdlib.h>  // NOLINT: mkdtemp is not in cstdlib
 
 #include <cmath>
 #include <cstdint>

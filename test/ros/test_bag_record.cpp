@@ -13,6 +13,7 @@
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "bag_record_test.h"
 

@@ -104,10 +104,10 @@ TEST_F(CheckRecord, EndsWith3WhereNothingCanUseIt) {
   EXPECT_EQ(finding("dead")["channel"], "motor_torque");
   EXPECT_FALSE(json()["serves"]["identify"]["ok"].get<bool>());
   const std::string rig = " --rig '" + test::package_file("config/two_inertia_servo.yaml") + "'";
-  for (const std::string line : {"diagnose_record a.csv" + rig + " --json y.json",
-                                 "identify a.csv" + rig + " --out y.yaml --json y.json",
-                                 "trace_residual" + rig + " --train a.csv --test a.csv --out y",
-                                 "detect_changes a.csv" + rig + " --healthy a.csv --json y.json"}) {
+  for (const std::string& line : {"diagnose_record a.csv" + rig + " --json y.json",
+                                  "identify a.csv" + rig + " --out y.yaml --json y.json",
+                                  "trace_residual" + rig + " --train a.csv --test a.csv --out y",
+                                  "detect_changes a.csv" + rig + " --healthy a.csv --json y.json"}) {
     const test::Outcome refused = run(line);
     EXPECT_EQ(refused.code, 65) << line;
     EXPECT_NE(refused.err.find("motor_torque: is 0 throughout"), std::string::npos) << line << refused.err;

@@ -179,19 +179,21 @@ TEST(EffectSearch, TeethOfAnotherShapeAloneAreNoHardening) {
 }
 
 // All teeth lose some per cent; 15 % is more than usual.
-TEST(EffectSearch, WhatTeethLoseIsNamedWhereItIsUnusual) {
-  for (const double share : {0.1, 0.3}) {
-    model::Rig machine = test::other_servo();
-    machine.terms.push_back(model::make_term("mesh_hysteresis", {{"share", share}, {"speed", 1e-3}}));
-    const Trace trace = traced(records_of(machine));
-    EXPECT_EQ(found(trace), share < 0.15 ? std::set<std::string>{} : std::set<std::string>{"mesh_hysteresis"})
-        << share;
-    ASSERT_FALSE(trace.augmented.terms.empty()) << share;
-    EXPECT_EQ(trace.augmented.terms.back()->id, "mesh_hysteresis") << share;
-    // The shape at small speeds is not resolved by the sampling: a twentieth.
-    EXPECT_NEAR(trace.augmented.terms.back()->values.at("share"), share, 0.05 * share);
-  }
+class EffectSearchOfLoss : public testing::TestWithParam<double> {};
+
+TEST_P(EffectSearchOfLoss, NamesItWhereItIsUnusual) {
+  const double share = GetParam();
+  model::Rig machine = test::other_servo();
+  machine.terms.push_back(model::make_term("mesh_hysteresis", {{"share", share}, {"speed", 1e-3}}));
+  const Trace trace = traced(records_of(machine));
+  EXPECT_EQ(found(trace), share < 0.15 ? std::set<std::string>{} : std::set<std::string>{"mesh_hysteresis"});
+  ASSERT_FALSE(trace.augmented.terms.empty());
+  EXPECT_EQ(trace.augmented.terms.back()->id, "mesh_hysteresis");
+  // The shape at small speeds is not resolved by the sampling: a twentieth.
+  EXPECT_NEAR(trace.augmented.terms.back()->values.at("share"), share, 0.05 * share);
 }
+
+INSTANTIATE_TEST_SUITE_P(Shares, EffectSearchOfLoss, testing::Values(0.1, 0.3));
 
 TEST(EffectSearch, TwoEffectsAtOnce) {
   model::Rig machine = test::other_servo();
