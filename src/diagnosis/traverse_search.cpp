@@ -21,12 +21,11 @@ constexpr double kBounces[] = {-1.5, 0, 1.5}, kMoreWeight = 1.5;
 constexpr double kBrief = 0.7;
 // Theory: of a cost of some thousand, a hundredth of a standard error.
 constexpr double kConverged = 1e-7;
-constexpr double kBeside[] = {0.7, 1.4};  // times the gap of a fit, from which others begin
-constexpr std::size_t kNearer = 3;        // guesses that are looked at with less noise
-constexpr std::size_t kGoneOn = 2;        // guesses that go on, the cheapest that differ
-constexpr double kOtherNoise = 0.1;       // by which the noise must differ for another fit
-constexpr double kAlike = 0.2;            // of the play, between fits that are the same
-constexpr double kRivalCost = 9;          // theory: three standard errors
+constexpr std::size_t kNearer = 3;   // guesses that are looked at with less noise
+constexpr std::size_t kGoneOn = 2;   // guesses that go on, the cheapest that differ
+constexpr double kOtherNoise = 0.1;  // by which the noise must differ for another fit
+constexpr double kAlike = 0.2;       // of the play, between fits that are the same
+constexpr double kRivalCost = 9;     // theory: three standard errors
 
 bool alike(const TraverseFit& a, const TraverseFit& b) {
   return std::fabs(std::log(a.gap() / b.gap())) < kAlike;
@@ -152,12 +151,14 @@ Fits solve_traverse(TraverseData& data, const GapTraverseSettings& settings,
     fits[0] = continued(data, settings, all, fits[0], noise);
   }
   noise = fits[0].noise();
-  // A fit stops where it is cheapest nearby.
-  std::vector<double> beside;
-  for (const double factor : kBeside) beside.push_back(factor * fits[0].gap());
-  for (const TraverseFit& other :
-       traverse_guesses(data, settings, windows, fits[0].fit.shared, beside, noise))
-    if (!alike(other, fits[0])) fits.push_back(continued(data, settings, all, other, noise));
+  // A fit stops where it is cheapest nearby, and takes all values there: others begin at the declared ones
+  // once more, with the noise that is known now. One that comes to the same play may still be much cheaper.
+  std::vector<double> gaps;
+  for (const double factor : kGapFactors) gaps.push_back(factor * fits[0].gap());
+  const Fits others =
+      traverse_guesses(data, settings, windows, Eigen::VectorXd::Zero(kTraverseValues), gaps, noise);
+  for (std::size_t i = 0; i < others.size() && i < kGoneOn; ++i)
+    fits.push_back(continued(data, settings, all, others[i], noise));
   for (std::size_t i = 1; i < guesses.size() && i < kGoneOn; ++i)
     fits.push_back(continued(data, settings, all, guesses[i], noise));
   std::stable_sort(fits.begin(), fits.end(),

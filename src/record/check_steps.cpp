@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "backlash_diagnosis/record/numbers.h"
+#include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "check_parts.h"
@@ -59,6 +60,13 @@ double usual_size(const std::vector<double>& excess) {
 bool has_shape(const std::vector<double>& e, std::size_t i) {
   return i > 0 && i + 1 < e.size() && std::fabs(e[i - 1] + 0.5 * e[i]) < kShape * std::fabs(e[i]) &&
          std::fabs(e[i + 1] + 0.5 * e[i]) < kShape * std::fabs(e[i]);
+}
+
+/// Whether the two speeds before i, and the two after i + 1, are known: no speed leads over a gap.
+bool has_speeds(const RecordLook& look, std::size_t i) {
+  const std::vector<double>& t = look.record.time;
+  const double gap = kGapFactor * look.interval;
+  return i >= 2 && i + 3 < t.size() && t[i] - t[i - 2] < gap && t[i + 3] - t[i + 1] < gap;
 }
 
 /// The last of up to kShortest wild samples from i + 1 on, else i. Wild: the position
@@ -170,7 +178,8 @@ std::vector<Jump> jumps_of(RecordLook& look, Channel channel) {
                least = least_excess(x, excess);
   std::vector<Jump> jumps;
   for (std::size_t i = 1; i + 2 < x.size(); ++i) {
-    if (std::fabs(excess[i]) < least * longer(look, i) || !has_shape(excess, i)) continue;
+    if (std::fabs(excess[i]) < least * longer(look, i) || !has_shape(excess, i) || !has_speeds(look, i))
+      continue;
     if (const std::size_t begin = begin_of_frozen(x, i, signal::smallest_step(x)); begin < i)
       cut_frozen(look, channel, begin, i + 1, fmt::format("and then jumps on by {:.4g}", excess[i]));
     else

@@ -179,6 +179,7 @@ void MappedCsv::read_row(std::string_view line) {
   // Some loggers write a separator behind the last name and none in the rows.
   std::size_t least = header_.size();
   while (!by_number_ && least > 0 && header_[least - 1].empty()) --least;
+  for (const MappedColumn& column : rows_.columns()) least = std::max(least, column.place + 1);
   if (fields_.size() < least || fields_.size() > header_.size())
     lines_.fail(std::to_string(fields_.size()) + (fields_.size() == 1 ? " field" : " fields") + " in " +
                 in_quotes(line) + ", expected " + std::to_string(header_.size()) +

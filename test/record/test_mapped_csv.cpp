@@ -145,6 +145,14 @@ TEST(MappedCsv, TimesOfDay) {
             "of its own");
 }
 
+// Found by a fuzzer: names above names, the last above empty, and a row that is as short.
+TEST(MappedCsv, ARowWithoutAColumnThatIsNamedInTheSecondLineIsRefused) {
+  const std::string header = "t,drive,\n[s],mode,x\n";
+  EXPECT_EQ(parse(header + "0,1,2\n1,1,3\n", clock("s")).column(Channel::motor_position),
+            (std::vector<double>{2, 3}));
+  EXPECT_EQ(refusal(header + "0,1\n", clock("s")).find("bench.csv:3: 2 fields in '0,1', expected 3"), 0u);
+}
+
 TEST(MappedCsv, TheOwnFormatIsReadAsBefore) {
   const std::string own = "time,motor_position\n0,0.1\n1,0.30000000000000004\n";
   EXPECT_EQ(parse(own).column(Channel::motor_position), (std::vector<double>{0.1, 0.30000000000000004}));

@@ -168,6 +168,19 @@ TEST(RecordCheck, DistinguishesStampsThatJitterFromSamplesThatAreLate) {
   EXPECT_NEAR(samples.record.time[77], uneven(77), 1e-12);
 }
 
+// A machine that falls through its play as a part begins: over the gap before it no speed is known.
+TEST(RecordCheck, AQuickBeginBehindAGapIsNoJump) {
+  const auto stamped = [](int k) { return k * kInterval + (k > 5000 ? 1 : 0); };
+  for (const bool gap : {true, false}) {
+    Record r = gap ? recorded([](int k) { return k * kInterval; }, stamped) : healthy();
+    const double before = r.column(Channel::load_position)[5000];
+    for (std::size_t k = 5001; k < 5003; ++k) r.column(Channel::load_position)[k] = before;
+    for (std::size_t k = 5003; k < r.size(); ++k) r.column(Channel::load_position)[k] += 0.02;
+    const CheckedRecord checked = check_record(r, servo());
+    EXPECT_EQ(checked.check.jumps.empty(), gap) << messages(checked.check);
+  }
+}
+
 TEST(RecordCheck, FindsAJumpWithItsSizeAndCutsThere) {
   for (const double size : {0.003, -0.003, 0.5236}) {
     Record r = healthy();
