@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks that every room is in its namespace, and includes only headers of rooms that it may know and private headers of
-no other room, and that the table of rooms on a page has the sizes that they have, within a tenth.
+no other room, that the fuzzers, which compile rooms by themselves, have all that those know, and that the table of rooms on a page
+has the sizes that they have, within a tenth.
 
 Usage: check_rooms.py CMakeLists.txt INCLUDE SRC PAGE [--write]      --write puts the sizes into the page
 What a room may know is what CMakeLists.txt says: room(NAME [FOLDER FOLDER] KNOWS ROOM... [READS_PRIVATE ROOM]), and all that those know.
@@ -11,9 +12,10 @@ import re
 import sys
 
 ROOM = re.compile(r"^room\((\w+)(?: COMPUTES)?(?: FOLDER (\S+))?((?: KNOWS(?: [a-z_]+)+)?)(?: READS_PRIVATE (\w+))?", re.MULTILINE)
+FUZZED = re.compile(r"^foreach\(room ((?:[a-z_]+ ?)+)\)", re.MULTILINE)
+FUZZ = "test/fuzz/CMakeLists.txt"
+FUZZED_IN_PART = {"simulation"}
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
-
-
 NAMESPACE = re.compile(r"^namespace backlash(\S*) \{", re.MULTILINE)
 SHARED = ("base", "nodes")  # in the outer namespace: the words of all rooms, and mains
 OTHER_NAMES = {"ros": "ros_bridge", "ros_arm": "ros_bridge"}  # backlash::ros would hide ::ros
@@ -61,6 +63,14 @@ def misnamed(path, room, text):
     return "%s: is in backlash%s, its room in backlash%s" % (path, found[0], wanted)
 
 
+def missing_of_fuzzers(cmake_file, known):
+    """Rooms that those of the fuzzers know and that are not compiled with them."""
+    fuzz_file = os.path.join(os.path.dirname(cmake_file), FUZZ)
+    rooms = set(FUZZED.search(open(fuzz_file).read())[1].split())
+    missing = set().union(*(known[room] for room in rooms)) - rooms - FUZZED_IN_PART
+    return ["%s: lacks room %s" % (fuzz_file, room) for room in sorted(missing)]
+
+
 def with_sizes(page, lines):
     """The text of the page with the sizes of its rooms, rounded to hundreds of lines; what is wrong with those that it has."""
     problems = []
@@ -79,7 +89,7 @@ def with_sizes(page, lines):
 
 def main(cmake_file, include, src, page, write=""):
     known, private, inner = known_rooms(cmake_file)
-    problems, lines = [], {room: 0 for room in known}
+    problems, lines = missing_of_fuzzers(cmake_file, known), {room: 0 for room in known}
     for root in (include, src):
         for folder, _, names in os.walk(root):
             for path in (os.path.join(folder, name) for name in names if name.endswith((".h", ".cpp"))):
