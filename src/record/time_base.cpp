@@ -63,9 +63,14 @@ void StampChecker::count_into(Record& record) const {
 }
 
 std::string StampChecker::describe(const std::string& where) const {
-  if (repeated_ == 0) return "";
-  return counted(repeated_, "repeated time stamp") + ": the later sample dropped; first at " +
-         (where.empty() ? "" : where + ", ") + "time = " + seconds(first_repeated_);
+  std::string text;
+  if (repeated_ > 0)
+    text = counted(repeated_, "repeated time stamp") + ": the later sample dropped; first at " +
+           (where.empty() ? "" : where + ", ") + "time = " + seconds(first_repeated_);
+  for (const Step& step : steps_)
+    text += fmt::format("{}the time goes back by {:.4g} s after {}: later times count on behind a gap",
+                        text.empty() ? "" : "; ", step.back, counted(step.sample, "sample"));
+  return text;
 }
 
 double median_interval(const std::vector<double>& time) {

@@ -235,6 +235,9 @@ TEST(Csv, RowsWhoseClockBeginsAnewCountOn) {
   EXPECT_EQ(record.clock_steps[0].time, record.time[12]);
   EXPECT_EQ(record.clock_steps[0].back, 11);
   EXPECT_EQ(record.time[23] - record.time[12], 11);
+  ASSERT_FALSE(record.warnings.empty());
+  EXPECT_EQ(record.warnings[0],
+            "the time goes back by 11 s after 12 samples: later times count on behind a gap");
 }
 
 TEST(Csv, GapsAndJitterAreReported) {

@@ -40,8 +40,8 @@ class StampChecker {
   /// Adds what was dropped, and where the clock was set, to a record that has its times.
   void count_into(Record& record) const;
 
-  /// Warning for Record::warnings, empty where nothing was dropped; `where` names the place ("line 17") if
-  /// known.
+  /// Warning for Record::warnings, empty where nothing was dropped and no clock set; `where` names the place
+  /// of the first repeated stamp ("line 17") if known.
   std::string describe(const std::string& where = "") const;
 
  private:
