@@ -62,7 +62,7 @@ JOINTS = ["none"] * 4 + ["gravity,load_dependent_friction"] * 6 + [
     "gravity,friction_swing", "payload_step", "gravity,payload_step"]
 RIGS = {"servo": "config/two_inertia_servo.yaml", "joint": "config/ur10e_joint.yaml"}
 # Joints of a robot's size with two encoders, recorded as by ROS, by make_robot_joint; with linear teeth and
-# Coulomb friction, and with teeth and friction of all kinds.
+# Coulomb friction, with teeth and friction of all kinds, and both with masses and shafts between their ends.
 ROBOTS = ["none", "cogging", "stribeck", "load_dependent_friction", "position_dependent_friction", "transmission_error",
           "varying_backlash", "gravity", "asymmetric_coulomb"]
 GROUPS = ("clean", "noisy", "joint", "robot")
@@ -95,7 +95,8 @@ def suite(first_seed):
         add(effects, options, "clean")
     for effects in JOINTS:
         add(effects, [], "joint")
-    for teeth, more in (("", []), ("_own_teeth", ["--own-teeth"])):
+    for teeth, more in (("", []), ("_own_teeth", ["--own-teeth"]), ("_masses", ["--masses"]),
+                        ("_own_teeth_masses", ["--own-teeth", "--masses"])):
         for effect in ROBOTS:
             seed = first_seed + len(cases)
             cases.append(Case(f"{len(cases):03d}_robot_{effect}{teeth}", effect,

@@ -59,10 +59,7 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
   std::optional<Hypothesis> vague;  // explains as well with values that the records do not determine
   for (const Trial& best : trials.fitted) {
     const Gain gain = compare(now, held_out_of(best, before, context));
-    const bool looked_at = context.settings.trials.of_torque_alone && gain.deflection &&
-                           !shapes_friction(best.candidate.id);  // about a standstill, which no sum shows
-    const std::string reason = looked_at ? "the pressed flanks do not show it"
-                                         : objection(gain, best.fit.machine, records, context.settings);
+    const std::string reason = objection(gain, best.fit.machine, records, context.settings);
     if (!reason.empty()) {
       h = with_rejected(std::move(h), best.candidate.id, reason);
       continue;

@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "balance.h"
 #include "steps.h"
+#include "trial.h"
 
 namespace backlash::identification {
 namespace {
@@ -135,6 +136,17 @@ std::optional<Hypothesis> with_best(const Hypothesis& h, const std::vector<Plain
   return *best;
 }
 
+/// With the orders of the last that the motion of the load shows: the flanks alone show only which of those
+/// that were tried are near.
+std::vector<Effect> with_orders(const Hypothesis& before, std::vector<Effect> effects,
+                                const SearchContext& context) {
+  const Hypothesis h = before.effects.empty() ? as_declared(before) : before;
+  Candidate& last = effects.back().candidate;
+  if (holds_orders(last))
+    if (const auto trial = tried(h, last, context)) last = with_free_orders(h, *trial, context).candidate;
+  return effects;
+}
+
 }  // namespace
 
 Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context) {
@@ -147,7 +159,7 @@ Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context) {
     return best->effects.back().gain.deflection ? misfit(of).deflection : misfit(of).torque;
   };
   if (!(of_channel(*best) < (1 - context.settings.asked.least_gain_unclear) * of_channel(h))) return h;
-  const auto with = refitted(*best, best->effects, context);
+  const auto with = refitted(*best, with_orders(h, best->effects, context), context);
   return with ? with_best_shapes(*with, context) : h;
 }
 

@@ -103,9 +103,7 @@ bool takes_half(const Misfit& before, const Misfit& after, double half) {
 /// Beside plain effects what no sum of torques shows: effects about a standstill, a delay, and other teeth.
 Hypothesis with_hidden_effects(const Hypothesis& plain, const Hypothesis& declared, const ServoData& unseen,
                                const SearchContext& context) {
-  SearchContext of_torque = context;
-  of_torque.settings.trials.of_torque_alone = true;
-  const Hypothesis more = add_effects_or_teeth(with_free_friction(plain, declared, context), of_torque);
+  const Hypothesis more = add_effects_or_teeth(with_free_friction(plain, declared, context), context);
   if (more.effects.size() > plain.effects.size() || more.other_teeth != plain.other_teeth) {
     Hypothesis believed = believe_all(more, declared, unseen, context);
     const bool teeth = believed.effects.size() == plain.effects.size() &&
@@ -158,7 +156,6 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
   Hypothesis h = add_effects_or_teeth(machine, context);
   h = take_simpler(h, context);
   h = add_learned(h, context);
-  h = drop_stand_ins(h, context);
   result.found = believe_all(h, machine, unseen, context);
   return result;
 }

@@ -29,7 +29,6 @@ struct TrialSettings {
       0.3;  // simulation: of the gain that is asked for; sensitivities mislead by so much
   double tie =
       0.005;  // choice: of the residuals: then the term with the fewest shapes, gravity before cogging
-  bool of_torque_alone = false;  // what the pressed flanks show has been looked at
 };
 
 /// When an effect is believed (least gains: TraceSettings).

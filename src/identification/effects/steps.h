@@ -47,9 +47,6 @@ Hypothesis add_map(const Hypothesis& h, const SearchContext& context);
 /// named effects on top.
 Hypothesis add_learned(const Hypothesis& h, const SearchContext& context);
 
-/// No effects where they leave more than they explain: they may be stand-ins for what has no name.
-Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
-
 /// Whether the strength of the last effect does not stand out of its error.
 bool last_is_vague(const Hypothesis& h, const SearchContext& context);
 /// Why the unseen record does not bear out the last effect; empty: it does.

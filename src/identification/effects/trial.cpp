@@ -90,12 +90,16 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
   return all;
 }
 
+bool holds_orders(const Candidate& candidate) {
+  return std::any_of(candidate.held_orders.begin(), candidate.held_orders.end(),
+                     [](double error) { return error > 0; });
+}
+
 // In times the noise floor: rows are weighed by what the machine left without the effect.
 Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context) {
   const std::vector<double>& held = trial.candidate.held_orders;
   const auto left = [&](const Trial& t) { return size(h.fitted->records.misfit(t.fit.machine)); };
-  if (std::all_of(held.begin(), held.end(), [](double error) { return error == 0; }) ||
-      clearly_right(h.fitted->records.misfit(trial.fit.machine), context))
+  if (!holds_orders(trial.candidate) || clearly_right(h.fitted->records.misfit(trial.fit.machine), context))
     return trial;
   Candidate free = trial.candidate;
   free.held_orders.clear();

@@ -28,6 +28,9 @@ struct Trials {
 Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
                   const SearchContext& context);
 
+/// Whether some of its orders are not fitted.
+bool holds_orders(const Candidate& candidate);
+
 /// An order that the travel does not resolve becomes the best whole number near its fitted value, unless the
 /// fitted value leaves a clearly smaller residual.
 Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context);

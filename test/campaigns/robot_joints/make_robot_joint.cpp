@@ -46,6 +46,12 @@ std::string truth(const Machine& m, const std::vector<std::pair<std::string, Run
                {"teeth", teeth[int(m.teeth)]},
                {"power", m.power},
                {"friction", m.bristles ? "lugre" : "coulomb"},
+               {"masses",
+                {{"pinion", m.masses.pinion},
+                 {"input_shaft", m.masses.input_shaft},
+                 {"wheel", m.masses.wheel},
+                 {"output_shaft", m.masses.output_shaft},
+                 {"flange", m.masses.flange}}},
                {"skew", m.skew},
                {"eccentricity", m.eccentricity}};
   if (const Effect& e = m.effect; !e.id.empty()) {
@@ -124,10 +130,12 @@ diagnosis:
 
 namespace {
 
-void make(std::uint64_t seed, const std::string& effect, bool own_teeth, double duration, double stamp_jitter,
-          const std::filesystem::path& out) {
+void make(std::uint64_t seed, const std::string& effect, bool own_teeth, bool masses, double duration,
+          double stamp_jitter, const std::filesystem::path& out) {
   Random machine_stream(seed, "machine");
   Machine machine = draw_machine(machine_stream);
+  Random masses_stream(seed, "masses");
+  if (masses) machine.masses = draw_masses(masses_stream);
   if (!effect.empty()) {
     const auto& ids = effect_ids();
     if (std::find(ids.begin(), ids.end(), effect) == ids.end())
@@ -159,13 +167,15 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 1;
   double duration = 25, stamp_jitter = 0;
   std::string out, effect;
-  bool own_teeth = false;
+  bool own_teeth = false, masses = false;
   options.add_options()("help,h", "this text")("seed", po::value(&seed)->required(),
                                                "of the machine and its motions")(
       "effect", po::value(&effect),
       "one that the rig file does not know, on a joint with mild errors of its sensors")(
       "own-teeth", po::bool_switch(&own_teeth),
       "with --effect: teeth and friction as drawn, else the plainest")(
+      "masses", po::bool_switch(&masses),
+      "a pinion behind a shaft of its own, other shafts, the output's encoder at the flange")(
       "duration", po::value(&duration)->default_value(25), "of a record [s]")(
       "stamp-jitter", po::value(&stamp_jitter)->default_value(0),
       "of stamps alone: standard deviation, share of an interval")(
@@ -178,7 +188,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     po::notify(given);
-    robot_joints::make(seed, effect, own_teeth, duration, stamp_jitter, out);
+    robot_joints::make(seed, effect, own_teeth, masses, duration, stamp_jitter, out);
     return 0;
   } catch (const po::error& error) {
     std::cerr << "make_robot_joint: " << error.what() << '\n';

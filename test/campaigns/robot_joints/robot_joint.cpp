@@ -12,7 +12,6 @@ namespace {
 constexpr double kStep = 1e-5;      // s: a cycle of the wheel on its shaft has two hundred
 constexpr double kLoop = 1e-3;      // s, of the controller
 constexpr double kMostTorque = 80;  // N m, of the drive
-constexpr double kWheel = 0.04;     // of the load's inertia
 constexpr double kBristle = 2e-5;   // rad, over which LuGre's friction builds up
 constexpr double kBuildUp = 1e-4;   // rad/s, within which Coulomb friction turns round
 
@@ -91,30 +90,46 @@ Motion draw_motion(const std::string& kind, Random& random, double duration, dou
 class Plant {
  public:
   explicit Plant(const Machine& m) : m_(m), v_(m.real) {
-    // Teeth and shaft in series have the stiffness: the shaft yields a fifth.
-    shaft_ = 5 * v_.stiffness, teeth_ = 1.25 * v_.stiffness;
-    wheel_ = kWheel * v_.load_inertia, load_ = v_.load_inertia - wheel_;
+    // In series they have the stiffness: what the shafts do not yield is left for the teeth.
+    const Masses& a = m.masses;
+    const double of_shafts = 1 / a.output_shaft + (a.pinion > 0 ? 1 / a.input_shaft : 0);
+    shaft_ = a.output_shaft * v_.stiffness, input_ = a.input_shaft * v_.stiffness;
+    teeth_ = v_.stiffness / (1 - of_shafts);
+    pinion_ = a.pinion * v_.motor_inertia, rotor_ = v_.motor_inertia - pinion_;
+    wheel_ = a.wheel * v_.load_inertia, load_ = v_.load_inertia - wheel_;
   }
 
   double qm = 0, wm = 0, qw = 0, ww = 0, ql = 0, wl = 0, through = 0;
 
-  void start(double q) { qm = qw = ql = q; }
+  double shown() const { return m_.masses.flange ? qw : ql; }
+
+  void start(double q) { qm = qp_ = qw = ql = q; }
 
   void step(double torque) {
-    through = teeth(qm - qw - wave("transmission_error"), wm - ww);
-    const double s = shaft_ * (qw - ql) + 2 * 0.02 * std::sqrt(shaft_ * wheel_) * (ww - wl);
+    const bool separate = pinion_ > 0;
+    if (!separate) qp_ = qm, wp_ = wm;
+    through = teeth(qp_ - qw - wave("transmission_error"), wp_ - ww);
+    const double of_rotor =
+        separate ? input_ * (qm - qp_) + shaft_damping(input_, pinion_) * (wm - wp_) : through;
+    const double s = shaft_ * (qw - ql) + shaft_damping(shaft_, wheel_) * (ww - wl);
     const double cogging = m_.cogging * std::sin(m_.cogging_order * qm);
-    wm += kStep / v_.motor_inertia *
-          (torque - motor_friction() - v_.motor_viscous * wm - cogging - undeclared() - through);
-    ww += kStep / wheel_ * (through - s);
+    wm += kStep / rotor_ *
+          (torque - motor_friction() - v_.motor_viscous * wm - cogging - undeclared() - of_rotor);
+    if (separate) wp_ += kStep / pinion_ * (of_rotor - through), qp_ += kStep * wp_;
+    const double at = m_.masses.flange ? ww : wl;
+    const double friction = v_.load_viscous * at + v_.load_coulomb * std::clamp(at / kBuildUp, -1.0, 1.0);
+    ww += kStep / wheel_ * (through - s - (m_.masses.flange ? friction : 0));
     wl += kStep / load_ *
-          (s - v_.load_viscous * wl - v_.load_coulomb * std::clamp(wl / kBuildUp, -1.0, 1.0) -
-           v_.gravity * std::sin(ql + v_.gravity_phase) -
+          (s - (m_.masses.flange ? 0 : friction) - v_.gravity * std::sin(ql + v_.gravity_phase) -
            (is("gravity") ? m_.effect.size * std::sin(ql + m_.effect.phase) : 0));
     qm += kStep * wm, qw += kStep * ww, ql += kStep * wl;
   }
 
  private:
+  static double shaft_damping(double stiffness, double inertia) {
+    return 2 * 0.02 * std::sqrt(stiffness * inertia);
+  }
+
   double motor_friction() {
     if (!m_.bristles) return v_.motor_coulomb * std::clamp(wm / kBuildUp, -1.0, 1.0);
     const double stribeck = 1 + 0.2 * std::exp(-std::pow(wm / 0.05, 2));
@@ -153,7 +168,7 @@ class Plant {
 
   const Machine& m_;
   const Values& v_;
-  double shaft_, teeth_, wheel_, load_, bristle_ = 0;
+  double shaft_, input_, teeth_, rotor_, pinion_, wheel_, load_, qp_ = 0, wp_ = 0, bristle_ = 0;
 };
 
 double rounded(double value, double step) {
@@ -235,6 +250,17 @@ Machine draw_machine(Random& random) {
   return m;
 }
 
+Masses draw_masses(Random& random) {
+  const auto log_uniform = [&](double from, double to) {
+    return from * std::pow(to / from, random.uniform(0, 1));
+  };
+  Masses a;
+  a.pinion = random.uniform(0.05, 0.5), a.input_shaft = log_uniform(4, 12);
+  a.wheel = log_uniform(0.01, 0.15), a.output_shaft = log_uniform(2.5, 8);
+  a.flange = random.chance(0.6);
+  return a;
+}
+
 const std::vector<std::string>& effect_ids() {
   static const std::vector<std::string> all = {"none",
                                                "cogging",
@@ -293,7 +319,7 @@ Run run(const Machine& m, const std::string& kind, double duration, Random& rand
     given += m.lag > 0 ? (asked - given) * kStep / (m.lag + kStep) : asked - given;
     const double ripple = 1 + m.ripple * std::sin(6 * m.ratio * 4 * plant.qm);
     plant.step(given * ripple);
-    loads.push_back(plant.ql);
+    loads.push_back(plant.shown());
     count.see(plant.through);
     if (time < next) continue;
     next = (double(++sample) + 1 + m.jitter * random.uniform(-1, 1)) / m.rate;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A robot's joint with two encoders in a cascaded position loop, as a bag of ROS shows it. Shares nothing
 // with the package that is tested. All at the load side of the reduction, SI units:
-//   J_m w_m' = tau - friction_m - cogging - T(x_m - x_w)
+//   J_r w_r' = tau - friction_m - cogging - R,      R = k_r (x_r - x_p) + c_r (w_r - w_p)
+//   J_p w_p' = R - T(x_p - x_w)
 //   J_w w_w' = T - S,   J_l w_l' = S - friction_l - G sin(x_l + p),   S = k_s (x_w - x_l) + c_s (w_w - w_l)
-// a rotor, the wheel behind the teeth and the load behind a shaft: teeth and shaft together have the
-// stiffness K.
+// a rotor, a pinion behind a shaft (or on the rotor), the wheel behind the teeth and the load behind a shaft:
+// teeth and shafts together have the stiffness K. The output's bearing and encoder are at the load, or at the
+// wheel's flange: friction_l then acts on the wheel, whose position is shown.
 #pragma once
 
 #include <string>
@@ -24,6 +26,13 @@ struct Values {
 
 enum class Teeth { linear, hertz, cubic, hysteresis };
 
+/// Where the compliance and the inertia are; all of the rig file's are in one place.
+struct Masses {
+  double pinion = 0, input_shaft = 0;     // of the motor's inertia, of the stiffness; 0: on the rotor
+  double wheel = 0.04, output_shaft = 5;  // of the load's inertia, of the stiffness
+  bool flange = false;                    // bearing and encoder at the wheel
+};
+
 /// One that the rig file does not know, "" for none; ids are the package's.
 struct Effect {
   std::string id;
@@ -42,6 +51,7 @@ struct Machine {
   double hysteresis = 0;                  // -, share of the torque that the direction of the deflection takes
   bool bristles = false;                  // LuGre in place of Coulomb friction on the motor
   double cogging = 0, cogging_order = 0;  // N m, per turn of the load
+  Masses masses;
   Effect effect;
   // Sensors: torque from current, encoders.
   double gain = 1, offset = 0, ripple = 0, lag = 0, noise = 0, step = 0.05;  // -, N m, -, s, N m, N m
@@ -54,6 +64,7 @@ struct Machine {
 };
 
 Machine draw_machine(Random& random);
+Masses draw_masses(Random& random);
 
 /// The same with mild errors of the sensors, and with an effect that its rig file does not know: one of
 /// effect_ids(). `own_teeth`: with the teeth and the friction that it was drawn with, else with linear teeth

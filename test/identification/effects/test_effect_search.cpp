@@ -94,15 +94,19 @@ TEST(EffectSearch, PreslidingIsTheShapeOfFrictionOrAnEffect) {
   expect_at_floor(effect);
 }
 
+ParameterValues friction_of_motor(double torque) {
+  ParameterValues values{{"torque", torque}};
+  values.set_choice("body", "motor");
+  return values;
+}
+
 // An offset of the torque, a twelfth of the declared dry friction, is what the zero of a current sensor
 // leaves; and the load's encoder of the test record counts from another zero, as after the robot was switched
 // on again.
 TEST(EffectSearch, WhatEveryMachineHasIsNotedAndNotCalledMissing) {
   model::Rig machine = test::other_servo();
-  ParameterValues offset{{"torque", 4}};
-  offset.set_choice("body", "motor");
   machine.terms = {model::make_term("cogging", {{"amplitude", 15}, {"order", 36}, {"phase", 0.7}}),
-                   model::make_term("asymmetric_coulomb", offset)};
+                   model::make_term("asymmetric_coulomb", friction_of_motor(4))};
   Records records = records_of(machine);
   for (double& q : records.test.column(record::Channel::load_position)) q += 0.3;
   const Trace trace = traced(records);
@@ -126,6 +130,20 @@ TEST(EffectSearch, WhatNoSumShowsIsFoundBesideWhatOneShows) {
   // Half a sample, by which a held torque may be misjudged, and two standard errors.
   EXPECT_NEAR(parameter(trace, "delay", "delay").value, 1.8e-3, 0.5e-3 + 2 * 0.3e-3);
   expect_at_floor(trace);
+}
+
+// A gap whose two waves the travel hardly resolves: the pressed flanks, which know no motion, show it as waves
+// of other orders, and the motion of the load corrects them.
+TEST(EffectSearch, AGapThatVariesSlowlyIsFoundBesideWhatASumShows) {
+  model::Rig machine = test::other_servo();
+  machine.terms = {
+      model::make_term("asymmetric_coulomb", friction_of_motor(12)),
+      model::make_term("transmission_error", {{"amplitude", 4.6e-5}, {"order", 29}, {"phase", 1.9}}),
+      model::make_term("varying_backlash", {{"amplitude", 0.22}, {"order", 1}, {"phase", 2.7}}),
+      model::make_term("varying_backlash", {{"amplitude", 0.1}, {"order", 4}, {"phase", 0.6}})};
+  const Trace trace = traced(records_of(machine));
+  EXPECT_EQ(found(trace),
+            (std::set<std::string>{"asymmetric_coulomb", "transmission_error", "varying_backlash"}));
 }
 
 // Noise of the torque hides them from its sum; they are closer to Hertzian teeth than to linear ones.

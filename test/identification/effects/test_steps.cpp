@@ -238,39 +238,6 @@ TEST(AddLearned, NothingWhereNothingIsLeft) {
   EXPECT_EQ(add_learned(h, bench.context).fitted, h.fitted);
 }
 
-/// A fit that left so much; two inertias, or one.
-Hypothesis that_leaves(double before, double after, const model::Rig& rig, const SearchBench& bench) {
-  const auto fit = [&](double left) {
-    return std::make_shared<const BandFit>(
-        BandFit{{}, {}, RecordSet(bench.data, 5, 50), Misfit{left, 0, 0.1, 0.1}});
-  };
-  Hypothesis h;
-  Machine declared;
-  declared.rig = rig;
-  h.declared = std::make_shared<const Machine>(declared);
-  h.base = fit(before);
-  h.fitted = fit(after);
-  h.effects = {cogging_effect(0.8, 7, 0.6)};
-  return h;
-}
-
-TEST(DropStandIns, OfTwoInertiasWhatLeavesMoreThanItExplains) {
-  const SearchBench bench{OneInertiaMachine()};
-  const model::Rig servo = test::servo_file().rig;
-  Hypothesis h = that_leaves(20, 15, servo, bench);
-  const Hypothesis none = drop_stand_ins(h, bench.context);
-  EXPECT_TRUE(none.effects.empty());
-  EXPECT_EQ(none.fitted, h.base);
-  EXPECT_FALSE(reason(none, "cogging").empty());
-  // Most of it explained; near the floor; of one channel.
-  h = that_leaves(20, 5, servo, bench);
-  h.effects[0].gain.evidence.gain = 0.75;
-  EXPECT_EQ(drop_stand_ins(h, bench.context).effects.size(), 1u);
-  EXPECT_EQ(drop_stand_ins(that_leaves(2.2, 1.9, servo, bench), bench.context).effects.size(), 1u);
-  EXPECT_EQ(drop_stand_ins(that_leaves(20, 15, test::one_inertia_rig(), bench), bench.context).effects.size(),
-            1u);
-}
-
 /// The part of the records, of machines of these two, in which a cogging fitted to the first differs most.
 std::optional<PartStrength> part_of_cogging(const OneInertiaMachine& machine,
                                             const OneInertiaMachine& other) {
