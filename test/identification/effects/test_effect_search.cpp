@@ -132,8 +132,8 @@ TEST(EffectSearch, WhatNoSumShowsIsFoundBesideWhatOneShows) {
   expect_at_floor(trace);
 }
 
-// A gap whose two waves the travel hardly resolves: the pressed flanks, which know no motion, show it as waves
-// of other orders, and the motion of the load corrects them.
+// A gap whose two waves the travel hardly resolves: the pressed flanks, which know no motion, show it as
+// waves of other orders, and the motion of the load corrects them.
 TEST(EffectSearch, AGapThatVariesSlowlyIsFoundBesideWhatASumShows) {
   model::Rig machine = test::other_servo();
   machine.terms = {
@@ -144,6 +144,17 @@ TEST(EffectSearch, AGapThatVariesSlowlyIsFoundBesideWhatASumShows) {
   const Trace trace = traced(records_of(machine));
   EXPECT_EQ(found(trace),
             (std::set<std::string>{"asymmetric_coulomb", "transmission_error", "varying_backlash"}));
+}
+
+// Orders that the travel does not resolve are tried a quarter of a wave apart; the motion of the load shows
+// which whole number near by it is.
+TEST(EffectSearch, AnOrderBetweenThoseThatAreTriedIsFound) {
+  model::Rig machine = test::other_servo();
+  machine.terms = {model::make_term("varying_backlash", {{"amplitude", 0.3}, {"order", 5}, {"phase", 2.1}})};
+  const Trace trace = traced(records_of(machine));
+  EXPECT_EQ(found(trace), std::set<std::string>{"varying_backlash"});
+  EXPECT_DOUBLE_EQ(parameter(trace, "varying_backlash", "order").value, 5);
+  expect_at_floor(trace);
 }
 
 // Noise of the torque hides them from its sum; they are closer to Hertzian teeth than to linear ones.
