@@ -59,7 +59,10 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
   std::optional<Hypothesis> vague;  // explains as well with values that the records do not determine
   for (const Trial& best : trials.fitted) {
     const Gain gain = compare(now, held_out_of(best, before, context));
-    const std::string reason = objection(gain, best.fit.machine, records, context.settings);
+    const bool of_teeth = h.other_teeth && stands_in_for_contact_law(best.candidate.id);
+    const std::string reason = of_teeth
+                                   ? "the law of the teeth is found, and no law is quite that of real ones"
+                                   : objection(gain, best.fit.machine, records, context.settings);
     if (!reason.empty()) {
       h = with_rejected(std::move(h), best.candidate.id, reason);
       continue;

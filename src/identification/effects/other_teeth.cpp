@@ -94,14 +94,14 @@ bool rather_linear(const Hypothesis& other, const Hypothesis& h, const SearchCon
 
 std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context) {
   const std::vector<Effect> others = without_stand_ins_for_teeth(h.effects);
-  if (clearly_right(misfit(h), context)) return std::nullopt;
+  const bool harden = others.size() < h.effects.size();
+  if (!harden && clearly_right(misfit(h), context)) return std::nullopt;
   // Of the machine without hardening, which has a stiffness of its own.
   const auto laws = with_hertzian_teeth(h.base->fit.machine.rig, context.range.torque);
   if (laws.empty()) return std::nullopt;
   context.report("trying other teeth");
   const auto other = best_of(laws, others, h, context);
   const RevisionSettings& revision = context.settings.revision;
-  const bool harden = others.size() < h.effects.size();
   if (!other || size(*other) >= (harden ? revision.as_good : revision.clearly_less) * size(h))
     return std::nullopt;
   if (!harden && rather_linear(*other, h, context)) return std::nullopt;
