@@ -60,9 +60,9 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
   for (const Trial& best : trials.fitted) {
     const Gain gain = compare(now, held_out_of(best, before, context));
     const bool of_teeth = h.other_teeth && stands_in_for_contact_law(best.candidate.id);
-    const std::string reason = of_teeth
-                                   ? "the law of the teeth is found, and no law is quite that of real ones"
-                                   : objection(gain, best.fit.machine, records, context.settings);
+    const std::string reason =
+        of_teeth ? "teeth of another law are in the model, and no law is quite that of real teeth"
+                 : objection(gain, best.fit.machine, records, context.settings);
     if (!reason.empty()) {
       h = with_rejected(std::move(h), best.candidate.id, reason);
       continue;

@@ -100,7 +100,8 @@ bool takes_half(const Misfit& before, const Misfit& after, double half) {
          above(after.deflection) < half * above(before.deflection);
 }
 
-/// Beside plain effects what no sum of torques shows: effects about a standstill, a delay, and other teeth.
+/// Beside plain effects what no sum of torques shows: effects about a standstill, a delay, a gap that varies
+/// slowly, and other teeth.
 Hypothesis with_hidden_effects(const Hypothesis& plain, const Hypothesis& declared, const ServoData& unseen,
                                const SearchContext& context) {
   const Hypothesis more = add_effects_or_teeth(with_free_friction(plain, declared, context), context);
