@@ -58,6 +58,7 @@ GearTrain::GearTrain(const Rig& rig)
       sensed_damping_(rig.sensor_with_damper ? equations_.input_damping : 0),
       lever_(equations_.lever),
       coulomb_{directional(rig.motor, ratio_), directional(rig.link, 1)},
+      load_end_(rig.bearing_at_gear ? kGear : kLink),
       torque_constant_(rig.torque_constant),
       contact_(rig.mesh.contact),
       variation_(rig.mesh.variation),
@@ -93,7 +94,7 @@ GearTrain::GearTrain(const Rig& rig)
   const auto rubs = [](const FrictionLimits& f) { return f.forward > 0 || f.backward > 0; };
   const bool load_rubs = (dry || rubs(coulomb_.load)) && moves(kLink);
   if (dry || rubs(coulomb_.motor) || (load_rubs && one_body())) dry_ends_.push_back({kMotor, {}});
-  if (load_rubs && !one_body()) dry_ends_.push_back({kLink, {}});
+  if (load_rubs && !one_body()) dry_ends_.push_back({load_end_, {}});
   smooth_ = contact_ && !contact_->needs_impact_speed() && !variation_ && !pairs_ && terms_.empty() &&
             dry_ends_.empty();
 }
@@ -358,8 +359,8 @@ void GearTrain::derivative(double t, const double* state, AppliedTorque applied,
 
 GearTrain::EndForces GearTrain::end_forces(double t, const double* state, AppliedTorque applied) const {
   const Balance b = balance(t, state, applied);
-  const double load = moves(kLink) ? b.net[layout_.node[kLink]] : 0;
-  return {b.net[layout_.node[kMotor]], load, b.mesh_torque, b.friction};
+  const int load = layout_.node[load_end_];
+  return {b.net[layout_.node[kMotor]], moves(load_end_) ? b.net[load] : 0, b.mesh_torque, b.friction};
 }
 
 inline GearTrain::PartMotion GearTrain::ends(const Motion& m) {

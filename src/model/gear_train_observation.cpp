@@ -20,8 +20,8 @@ Observation GearTrain::observe(const double* state, AppliedTorque applied, doubl
                         : none;
   o.sensor_twist = layout_.input_gives ? twist * ratio_ : none;
   o.sensor_twist_rate = layout_.input_gives ? twist_rate * ratio_ : none;
-  o.load_position = load_gain_ * s.q[kLink];
-  o.load_velocity = load_gain_ * s.w[kLink];
+  o.load_position = load_gain_ * s.q[load_end_];
+  o.load_velocity = load_gain_ * s.w[load_end_];
   o.output_torque = layout_.output_gives ? equations_.output_stiffness * (s.q[kGear] - s.q[kLink]) : none;
   o.motor_current = applied.motor / torque_constant_;
   double rate[kMaxStates];

@@ -55,6 +55,12 @@ bool read_sensor_output(const YamlReader& parent) {
   return yaml.has("output") && yaml.choice("output", {"spring", "spring_and_damper"}) == "spring_and_damper";
 }
 
+bool read_bearing(const YamlReader& parent) {
+  if (parent.is_text("output_coupling")) return false;
+  const YamlReader yaml = parent.map("output_coupling");
+  return yaml.has("bearing") && yaml.choice("bearing", {"gear", "link"}) == "gear";
+}
+
 Mesh read_mesh(const YamlReader& yaml) {
   Mesh mesh;
   if (yaml.has("base_radius")) mesh.base_radius = yaml.number("base_radius", Range::positive());
@@ -104,9 +110,13 @@ void read_gear_train(const YamlReader& yaml, Rig& rig) {
   else
     rig.mesh = read_mesh(yaml.map("mesh"));
   rig.output_coupling = read_coupling(yaml, "output_coupling");
+  rig.bearing_at_gear = read_bearing(yaml);
+  if (rig.bearing_at_gear && rig.mesh.rigid)
+    yaml.fail("output_coupling", "a bearing at the gear needs a mesh that gives way");
   if (yaml.is_text("link")) {
     yaml.choice("link", {"locked"});
     rig.link_locked = true;
+    if (rig.bearing_at_gear) yaml.fail("link", "a locked link has no bearing at the gear");
     if (rig.mesh.rigid && rig.output_coupling.rigid)
       yaml.fail("link", "a locked link on a rigid mesh moves nothing");
   } else if (yaml.has("link") || !rig.mesh.rigid || !rig.output_coupling.rigid) {

@@ -55,12 +55,13 @@ bool operator==(const Mesh& a, const Mesh& b) {
 
 bool operator==(const Rig& a, const Rig& b) {
   const auto& [name, joint, ratio, motor_side, linear, motor, pinion, gear, link, torque_constant, input,
-               output, sensor_with_damper, link_locked, mesh, terms, skew, coupled] = a;
+               output, sensor_with_damper, at_gear, link_locked, mesh, terms, skew, coupled] = a;
   return name == b.name && joint == b.joint && ratio == b.reduction_ratio && motor_side == b.motor_side &&
          linear == b.linear && motor == b.motor && pinion == b.pinion && gear == b.gear && link == b.link &&
          same_number(torque_constant, b.torque_constant) && input == b.input_coupling &&
          output == b.output_coupling && sensor_with_damper == b.sensor_with_damper &&
-         link_locked == b.link_locked && mesh == b.mesh && skew == b.encoder_skew && coupled == b.coupled &&
+         at_gear == b.bearing_at_gear && link_locked == b.link_locked && mesh == b.mesh &&
+         skew == b.encoder_skew && coupled == b.coupled &&
          std::equal(terms.begin(), terms.end(), b.terms.begin(), b.terms.end(), same_term);
 }
 

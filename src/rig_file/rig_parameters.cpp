@@ -76,6 +76,9 @@ std::vector<RigParameter> make_parameters() {
   for (RigParameter& p : friction()) all.push_back(std::move(p));
   all.push_back({"start_in_gap", RigPart::mesh, Kind::start_in_gap, "-", "gear_train.mesh.start_in_gap",
                  Range::any(), 0, "", "", "", BACKLASH_FIELD(mesh.start_in_gap)});
+  all.push_back({"output_stiffness", RigPart::output, Kind::stiffness, "N m/rad",
+                 "gear_train.output_coupling.stiffness", Range::positive(), 0, "", "", "",
+                 BACKLASH_FIELD(output_coupling.stiffness)});
   all.push_back({"encoder_skew", RigPart::sensors, Kind::encoder_skew, "s", "sensors.encoder_skew",
                  Range::any(), 0, "", "", "", BACKLASH_FIELD(encoder_skew)});
   return all;
@@ -88,6 +91,7 @@ std::vector<RigParameter> make_parameters() {
 
 bool RigParameter::known_to(const model::Rig& rig) const {
   if (part == RigPart::sensors) return !rig.mesh.rigid && !rig.link_locked;
+  if (part == RigPart::output) return !rig.output_coupling.rigid;
   if (part != RigPart::mesh) return true;
   return !rig.mesh.rigid && (contact.empty() || rig.mesh.contact_spec().values.has(contact));
 }

@@ -32,6 +32,8 @@ class LockedLoad {
 
   double q = 0, w = 0;
 
+  double shown() const { return q; }
+
   double begin(const Segment& s) { return (last_ = forces(s.at(0))).mesh_torque; }
 
   double step(const Segment& s, Halves<double>& sum) {
@@ -61,9 +63,13 @@ class LockedLoad {
 };
 
 void check(const model::Rig& rig) {
-  if (!rig.input_coupling.rigid || !rig.output_coupling.rigid)
-    throw InvalidParameter("coupling", "flexible",
-                           "a load that follows the recorded motor needs rigid couplings");
+  if (!rig.input_coupling.rigid)
+    throw InvalidParameter("input_coupling", "flexible",
+                           "a load that follows the recorded motor needs a rigid one");
+  if (!rig.output_coupling.rigid && !rig.bearing_at_gear)
+    throw InvalidParameter(
+        "output_coupling", "flexible",
+        "a load that follows the recorded motor needs a rigid one or a bearing at the gear");
   if (!rig.mesh.rigid && rig.mesh.contact->needs_impact_speed())
     throw InvalidParameter("contact.law", "with touches",
                            "a load that follows the recorded motor needs a law without impact speed");
@@ -78,7 +84,7 @@ DrivenLoad follow(Body& load, const RecordedMotion& motion) {
   for (std::size_t k = 0; k < n; ++k) {
     const Segment segment = segment_after(motion, k);
     if (k == 0) mesh_torque = load.begin(segment);
-    out.load[k] = load.q;
+    out.load[k] = load.shown();
     out.load_rate[k] = load.w;
     out.mesh_torque[k] = mesh_torque;
     if (!(std::fabs(load.w) < kFarthest)) run_away(segment.start);

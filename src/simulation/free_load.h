@@ -16,6 +16,7 @@
 #include "lanes.h"
 // Beyond the lanes.
 #include "driven_step.h"
+#include "geared_shaft.h"
 
 namespace backlash::simulation {
 
@@ -44,10 +45,11 @@ inline DrivenLoad columns(std::size_t samples) {
 class FreeLoad {
  public:
   FreeLoad(const model::Rig& rig, double feedback)
-      : train_(rig),
+      : train_(load_as_one(rig)),
         inertia_(train_.load_inertia()),
         feedback_(feedback),
-        rubs_(train_.friction_event_count() > 0),
+        shaft_{rig.output_coupling.rigid ? 0 : rig.output_coupling.stiffness},
+        rubs_(train_.friction_event_count() > 0 && !shaft_),
         shaped_(train_.flanks_shift_with_position()),
         plain_(train_.plain_load()) {
     if (!plain_) return;
@@ -61,8 +63,12 @@ class FreeLoad {
 
   double q = 0, w = 0;
 
+  /// rad: what an encoder shows.
+  double shown() const { return shaft_ ? last_.gear.position : q; }
+
   double begin(const Segment& s) {
-    last_ = forces(s.at(0), q, w);
+    last_.gear.position = last_.position = q;
+    last_ = forces(s.at(0), q, w, last_);
     mode_.begin(last_.net, w, last_.friction, q);
     return last_.mesh_torque;
   }
@@ -82,7 +88,8 @@ class FreeLoad {
 
   /// Whether it can move beside another: in sliding with the same friction all along.
   bool joins(const FreeLoad& other) const {
-    return plain_ && !(friction_.presliding > 0) && forces_.teeth.exponent == other.forces_.teeth.exponent;
+    return plain_ && !shaft_ && !(friction_.presliding > 0) &&
+           forces_.teeth.exponent == other.forces_.teeth.exponent;
   }
   const PlainLoad<double>& plain_forces() const { return forces_; }
   bool stuck() const { return mode_.stuck(); }
@@ -93,7 +100,7 @@ class FreeLoad {
   void slid_to(double position, double rate, const PlainLoad<double>::Forces& f) {
     q = position;
     w = rate;
-    last_ = {{f.net, f.mesh_torque, -f.mesh_torque, friction_}, position, rate};
+    last_ = {{f.net, f.mesh_torque, -f.mesh_torque, friction_}, position, rate, {position}};
     flanks_.reset();
   }
 
@@ -103,6 +110,7 @@ class FreeLoad {
   using Flanks = std::optional<model::GearTrain::Flanks>;
   struct Forces : model::GearTrain::LoadForces {  // net with what draws the load
     double position, rate;                        // rad, rad/s, of the load
+    Gear gear;
     int side() const { return (mesh_torque > 0) - (mesh_torque < 0); }
   };
   struct Move {
@@ -118,14 +126,31 @@ class FreeLoad {
     return f.net < f.friction.forward && -f.net < f.friction.backward;
   }
 
-  /// `flanks`: where they are at nearly this position, if known.
-  Forces forces(const Moment& m, double position, double rate, const Flanks& flanks = {}) const {
+  /// `before`: those of a moment before. `flanks`: where they are at nearly this position, if known.
+  Forces forces(const Moment& m, double position, double rate, const Forces& before,
+                const Flanks& flanks = {}) const {
+    if (!shaft_) return {acting(m, position, rate, flanks), position, rate, {position}};
+    const double gear_rate = shaft_.rate(before.gear, before.side() != 0, m.motor_rate, rate);
+    model::GearTrain::LoadForces f;
+    const auto with_gear_at = [&](double gear) -> const model::GearTrain::LoadForces& {
+      return f = acting(m, gear, gear_rate, flanks);
+    };
+    const double guess = before.gear.position + position - before.position;
+    const Gear gear = shaft_.follow(before.gear, guess, position, with_gear_at);
+    f.net += shaft_.stiffness * (gear.position - position) - f.mesh_torque;
+    f.friction = {};
+    return {f, position, rate, gear};
+  }
+
+  /// With the gear at this position.
+  model::GearTrain::LoadForces acting(const Moment& m, double gear, double rate, const Flanks& flanks) const {
     if (plain_) {
-      const PlainLoad<double>::Forces f = forces_.forces(m, position, rate);
-      return {{f.net, f.mesh_torque, -f.mesh_torque, friction_}, position, rate};
+      const PlainLoad<double>::Forces f = forces_.forces(m, gear, rate);
+      return {f.net, f.mesh_torque, -f.mesh_torque, friction_};
     }
-    const model::Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0};
-    Forces f{flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion), position, rate};
+    const model::Motion motion{m.time, m.motor, m.motor_rate, gear, rate, 0};
+    model::GearTrain::LoadForces f =
+        flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion);
     f.net += inertia_ * feedback_ * (m.load_rate - rate);
     return f;
   }
@@ -146,8 +171,8 @@ class FreeLoad {
         halfway = train_.flanks(middle.motor, q + 0.25 * h * (w + rate));
         beyond = train_.flanks(end.motor, q + h * rate);
       }
-      if (stage == 2) return acceleration(forces(end, position, rate, beyond));
-      stages[stage] = forces(middle, position, rate, halfway);
+      if (stage == 2) return acceleration(forces(end, position, rate, stages[1], beyond));
+      stages[stage] = forces(middle, position, rate, f, halfway);
       return acceleration(stages[stage]);
     };
     double to_q = q, to_w = w;
@@ -157,7 +182,7 @@ class FreeLoad {
             to_w,
             stages[1].side(),
             0.5 * (stages[0].mesh_on_motor + stages[1].mesh_on_motor),
-            forces(end, to_q, to_w, beyond),
+            forces(end, to_q, to_w, stages[1], beyond),
             beyond};
   }
 
@@ -199,7 +224,7 @@ class FreeLoad {
   }
 
   double hold(const Segment& s, double u, Forces& f, bool divide, Halves<double>& sum) {
-    const auto at = [&](double v) { return forces(s.at(v), q, 0); };
+    const auto at = [&](double v) { return forces(s.at(v), q, 0, f); };
     const auto changes = [&](const Forces& end) { return end.side() != f.side() || !holds(end); };
     double before = 1, after = 1;
     if (divide && changes(at(1)))
@@ -219,16 +244,23 @@ class FreeLoad {
   void cross(const Segment& s, double before, double after, const Forces& from, Forces& f,
              Halves<double>& sum) {
     flanks_.reset();
-    const bool sticks = !(from.friction.presliding > 0);
+    const bool sticks = rubs_ && !(from.friction.presliding > 0);
     if (sticks && mode_.direction() * w <= 0) w = 0;
-    f = forces(s.at(after), q, w);
-    mode_.update(f.net, w, f.friction, q);
+    f = forces(s.at(after), q, w, from);
+    if (rubs_ || mode_.stuck()) mode_.update(f.net, w, f.friction, q);
     const double mean = 0.5 * (from.mesh_on_motor + f.mesh_on_motor);
     sum.add(before, after, mean, mean, mean);
   }
 
+  /// Gear and link as one body.
+  static model::Rig load_as_one(model::Rig rig) {
+    rig.output_coupling.rigid = true;
+    return rig;
+  }
+
   model::GearTrain train_;
   double inertia_, feedback_;
+  GearedShaft shaft_;
   bool rubs_, shaped_, plain_;
   PlainLoad<double> forces_{};      // of a plain load
   model::FrictionLimits friction_;  // of a plain load

@@ -48,6 +48,39 @@ TEST(DrivenLoad, RepeatsTheWholeTrain) {
   EXPECT_LT(worst(driven.load_rate, record.column(record::Channel::load_velocity)), 5e-3);
 }
 
+// As RepeatsTheWholeTrain; without friction nothing wears an impact's error off, and the load drifts.
+TEST(DrivenLoad, ALoadWithoutFrictionRepeatsTheWholeTrain) {
+  model::Rig rig = other_servo();
+  rig.link.coulomb_friction = 0;
+  const record::Record record = simulate_record(rig, test::servo_run(3, false), 5);
+  const DrivenLoad driven = simulate_driven_load(rig, motion_of(record));
+  EXPECT_LT(worst(driven.load, record.column(record::Channel::load_position)), 2e-4);
+  EXPECT_LT(worst(driven.load_rate, record.column(record::Channel::load_velocity)), 5e-3);
+}
+
+/// rad, root mean square, by which a load with this output coupling is off that of the servo behind a shaft
+/// with this share of the inertia on its gear.
+double off_the_train(double share, const model::Coupling& output) {
+  model::Rig rig = test::servo_behind_shaft(share);
+  const record::Record record = simulate_record(rig, test::servo_run(3, false), 5);
+  RecordedMotion motion = motion_of(record);
+  rig.output_coupling = output;
+  const DrivenLoad driven = simulate_driven_load(rig, motion);
+  double square = 0;
+  for (std::size_t k = 0; k < record.size(); ++k)
+    square += std::pow(driven.load[k] - record.column(record::Channel::load_position)[k], 2);
+  return std::sqrt(square / double(record.size()));
+}
+
+// The whole train has a gear with mass, which rings for a moment between teeth and shaft after each impact:
+// the less of it, the nearer. A load without a shaft is ten times as far off.
+TEST(DrivenLoad, BehindAShaftMovesAsTheTrainWithALightGear) {
+  const model::Coupling shaft = test::servo_behind_shaft(0.01).output_coupling;
+  const double light = off_the_train(0.002, shaft);
+  EXPECT_LT(light, off_the_train(0.05, shaft));
+  EXPECT_LT(light, 0.1 * off_the_train(0.002, {}));
+}
+
 TEST(DrivenLoad, FeedbackHoldsALoadThatStartsWrong) {
   const model::Rig rig = other_servo();
   const record::Record record = simulate_record(rig, test::servo_run(4, false), 3);

@@ -339,6 +339,27 @@ TEST(DryFrictionOfTrains, EitherSideOfTheReductionIsTheSameMachine) {
   }
 }
 
+// The gear is held in the gap by its bearing, whose friction the link does not reach: it swings as on a wall.
+TEST(DryFrictionOfTrains, ALinkSwingsOnAGearThatItsBearingHolds) {
+  model::Rig rig = servo();
+  rig.output_coupling = {false, 1e6, 0, 0};
+  rig.bearing_at_gear = true;
+  rig.gear.inertia = 1;
+  rig.link = {108, 0, 0, 15, 0};
+  const double amplitude = 0.9 * 15 / 1e6;  // rad
+  Plant plant(rig, sine(0, 1), test::solver(1e-10));
+  Plant::State state{};  // motor, gear, link; their speeds
+  state[2] = amplitude;
+  plant.set_state(state);
+  const double w = std::sqrt(1e6 / rig.link.inertia);
+  for (int k = 1; k <= 100; ++k) {
+    plant.advance_to(0.002 * k);
+    EXPECT_NEAR(plant.state()[2], amplitude * std::cos(w * 0.002 * k), 1e-6 * amplitude);
+    EXPECT_EQ(plant.state()[1], 0);
+  }
+  EXPECT_EQ(plant.observe().load_position, 0);  // its encoder is there too
+}
+
 // A torque sensor between a motor that rubs and a locked link: where all has come to rest the sensor shows
 // the torque but for the motor's friction, and nothing at all before the motor moves.
 TEST(DryFrictionOfTrains, BehindAFlexibleCouplingTheMotorsFrictionIsMissing) {

@@ -28,6 +28,17 @@ inline model::Rig other_servo() {
   return rig;
 }
 
+/// The same with its load behind a shaft three times as stiff as the teeth, bearing and encoder before it, on
+/// a gear of this share of the inertia.
+inline model::Rig servo_behind_shaft(double gear) {
+  model::Rig rig = other_servo();
+  rig.output_coupling = {false, 1.2e6, 0, 0};
+  rig.bearing_at_gear = true;
+  rig.gear.inertia = gear * rig.link.inertia;
+  rig.link.inertia -= rig.gear.inertia;
+  return rig;
+}
+
 /// Torque that moves the servo to and fro with many impacts.
 inline simulation::ExcitationSettings shaking(std::uint64_t seed) {
   simulation::ExcitationSettings e;

@@ -9,9 +9,10 @@
 //
 // Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its
 // neighbours one body, so does a rigid mesh; a locked link has q_L = 0. F_M and F_L are dry friction with
-// sticking, see StickSlip; a braked motor sticks whatever the torque. Terms may shift either flank by an
-// opening o(q_M, q_L, torque). Its penetration is then side x - backlash / 2 - r o, and the mesh torque acts
-// on both ends also through the slopes of o. This conserves energy unless o depends on the torque.
+// sticking, see StickSlip; F_L acts on the gear where the bearing is there (Rig::bearing_at_gear); a braked
+// motor sticks whatever the torque. Terms may shift either flank by an opening o(q_M, q_L, torque). Its
+// penetration is then side x - backlash / 2 - r o, and the mesh torque acts on both ends also through the
+// slopes of o. This conserves energy unless o depends on the torque.
 //
 // If mesh and couplings are rigid, the teeth do not appear in the equations. Terms that depend on the torque
 // through the teeth then get the torque that the load takes,
@@ -185,7 +186,7 @@ class GearTrain : private TrainParts {
     EndFriction friction;
   };
   struct DryEnd {
-    int part;  // kMotor or kLink
+    int part;  // kMotor, kLink or kGear
     StickSlip mode;
     double position = 0;  // rad, where it sticks
   };
@@ -193,8 +194,8 @@ class GearTrain : private TrainParts {
   bool moves(int part) const { return layout_.node[part] != TrainLayout::kFixed; }
   bool one_body() const { return layout_.node[kLink] == layout_.node[kMotor]; }
   PartMotion part_motion(const double* state) const { return equations_.part_motion(layout_, state); }
-  static Motion motion_of(double t, const PartMotion& s, double mesh_torque) {
-    return {t, s.q[kMotor], s.w[kMotor], s.q[kLink], s.w[kLink], mesh_torque};
+  Motion motion_of(double t, const PartMotion& s, double mesh_torque) const {
+    return {t, s.q[kMotor], s.w[kMotor], s.q[load_end_], s.w[load_end_], mesh_torque};
   }
   double add_teeth(const PartMotion& s, double* torque) const;
   double net_torques(double t, const PartMotion& s, AppliedTorque applied, double* net) const;
@@ -234,6 +235,7 @@ class GearTrain : private TrainParts {
   double sensed_damping_;  // N m s/rad, the part of the sensor's damper that sensor_torque shows
   double half_gap_, lever_;
   EndFriction coulomb_;
+  int load_end_;  // the part of the load that rubs and is shown: kLink, or kGear (Rig::bearing_at_gear)
   bool shaped_ = false, shape_follows_torque_ = false, loaded_ = false;
   bool friction_of_load_ = false;  // of one body, follows what its load takes
   bool braked_ = false;

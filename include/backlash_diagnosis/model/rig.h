@@ -74,6 +74,9 @@ struct Rig {
   Coupling input_coupling, output_coupling;
   bool sensor_with_damper =
       false;  // sensor_torque is spring plus damper of the input coupling, not the spring alone
+  /// The load's bearing rubs, and its encoder reads, at the gear, before a flexible output coupling; else at
+  /// the link. `output_coupling: bearing` of the rig file.
+  bool bearing_at_gear = false;
   bool link_locked = false;
   Mesh mesh;
   std::vector<std::shared_ptr<const Term>> terms;

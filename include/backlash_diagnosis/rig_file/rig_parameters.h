@@ -13,7 +13,7 @@
 namespace backlash::rig_file {
 
 /// What a parameter belongs to.
-enum class RigPart { motor, link, mesh, sensors };
+enum class RigPart { motor, link, mesh, output, sensors };
 
 enum class ParameterKind {
   inertia,
@@ -56,7 +56,8 @@ struct RigParameter {
 /// Of two inertias with a mesh between them: motor_inertia load_inertia mesh_stiffness mesh_damping
 /// mesh_series_stiffness mesh_alpha backlash_angle motor_coulomb motor_viscous load_coulomb load_viscous,
 /// then where directions differ motor_coulomb_asymmetry, motor_viscous_asymmetry, load_coulomb_asymmetry,
-/// load_viscous_asymmetry, start_in_gap, and encoder_skew. Setting may make a rig that GearTrain refuses.
+/// load_viscous_asymmetry, start_in_gap, output_stiffness of a flexible output coupling, and encoder_skew.
+/// Setting may make a rig that GearTrain refuses.
 const std::vector<RigParameter>& servo_parameters();
 
 /// By name, or by what it is (of both directions: the mean). Throw InvalidParameter for one that is not in

@@ -8,6 +8,13 @@
 // recorded one (k [1/s]), it follows. What remains between simulated and recorded load is the error of the
 // model.
 //
+// Behind a flexible output coupling with the bearing at the gear (Rig::bearing_at_gear) the load is
+//   J_L w' = k (q_G - q_L) - c_L w + terms + J_L k (w_rec - w_G),   T_mesh(q_M, q_G) - R = k (q_G - q_L), |R|
+//   <= F_L
+// with J_L of gear and link: the gear q_G, which the encoder shows, is massless and moves no farther than it
+// must to keep the friction R of its bearing within the limit. Right for motions slow beside the gear's own
+// between teeth and coupling. Damping of the coupling is left out.
+//
 // Where the link is locked or the mesh rigid the load has no motion of its own: it stands, or moves with the
 // motor, and only the torque on the motor is computed.
 //
@@ -35,7 +42,7 @@ struct RecordedMotion {
 };
 
 struct DrivenLoad {
-  std::vector<double> load, load_rate;  // rad, rad/s
+  std::vector<double> load, load_rate;  // rad, as an encoder without error shows it; rad/s, of the link
   std::vector<double> mesh_torque;      // N m, through the teeth; 0 of a rigid mesh
   /// N m, of the teeth on the motor: mean about each sample, weighted 1 - |t| / interval, which is what a
   /// second difference of the motor position sees. At the ends over one interval.
@@ -55,7 +62,8 @@ constexpr double kLoadFeedback = 50;
 /// Whether the load has a motion of its own to be simulated.
 bool load_moves_freely(const model::Rig& rig);
 
-/// Throws InvalidParameter for a rig with flexible couplings or a contact law that needs touches;
+/// Throws InvalidParameter for a rig with a flexible input coupling, a flexible output coupling with the
+/// bearing at the link, or a contact law that needs touches;
 /// IntegrationError where the load runs away.
 DrivenLoad simulate_driven_load(const model::Rig& rig, const RecordedMotion& motion,
                                 double feedback = kLoadFeedback);

@@ -96,18 +96,18 @@ Hypothesis add_effects(const Hypothesis& before, const SearchContext& context) {
 
 Hypothesis add_effects_or_teeth(const Hypothesis& before, const SearchContext& context) {
   Hypothesis h = before;
-  std::size_t tried_with = 0;  // effects, when other teeth were tried last
+  std::size_t tried_with = 0;  // effects, when another machine was tried last in vain
   for (;;) {
     const std::size_t count = h.effects.size();
     if (count < context.settings.asked.most_effects) h = add_effect(h, context);
     const bool more = h.effects.size() > count;
     const bool hardening = more && stands_in_for_contact_law(h.effects.back().candidate.id);
     if ((hardening || !more) && tried_with != h.effects.size()) {
-      tried_with = h.effects.size();
-      if (auto other = with_other_teeth(h, context)) {
+      if (auto other = with_other_machine(h, context)) {
         h = std::move(*other);
         continue;
       }
+      tried_with = h.effects.size();
     }
     if (!more) return h;
   }

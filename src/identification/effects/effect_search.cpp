@@ -142,8 +142,9 @@ void forget_torque(Trace& trace) {
 void describe_errors(const SearchResult& result, const std::vector<ServoPrediction>& on_test,
                      const Records& records, const FitSettings& fit, Trace& trace) {
   const Machine &base = result.declared.base->fit.machine, &last = result.found.fitted->fit.machine;
-  const ServoPrediction before =
-      result.found.other_teeth ? predicted(base, records.test, fit) : on_test.front();
+  const ServoPrediction before = result.found.other_teeth || result.found.behind_shaft
+                                     ? predicted(base, records.test, fit)
+                                     : on_test.front();
   const ServoPrediction& after = on_test.back();
   const auto channel = [&](const std::string& name, ChannelError ServoPrediction::*of, double sensors,
                            double repeats) {
@@ -211,7 +212,8 @@ void judge_remainder(const std::vector<ChannelRemainder>& all, const Hypothesis&
                                                 c.left.explainable.upper};
   }
   trace.unexplained = signature(all, trace.augmented.linear, settings);
-  const bool as_declared = found.effects.empty() && !found.other_teeth && !trace.augmented.coupled;
+  const bool as_declared =
+      found.effects.empty() && !found.other_teeth && !found.behind_shaft && !trace.augmented.coupled;
   if (!trace.unexplained && as_declared)
     trace.unexplained =
         impossible_friction(trace.base_parameters, trace.units, motion_size(test), search.belief, settings);
@@ -292,6 +294,11 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
         fmt::format("the teeth are Hertzian (contact law {}), not linear as declared: they are in the model, "
                     "but nothing is called missing for it",
                     trace.augmented.mesh.contact_spec().law));
+  if (found.behind_shaft)
+    trace.notes.push_back(
+        fmt::format("the load turns behind a shaft of {:.3g} N m/rad, before which its bearing rubs and its "
+                    "encoder reads: it is in the model, but nothing is called missing for it",
+                    trace.augmented.output_coupling.stiffness));
   note_shape_of_friction(
       found,
       simulation::load_moves_freely(declared) ? settings.shape_of_friction : settings.shape_of_all_torque,

@@ -46,6 +46,10 @@ BandFit fit_with_effects(Machine machine, bool delay, Settled settled, const Sea
 
 }  // namespace
 
+bool same_machine(const Hypothesis& a, const Hypothesis& b) {
+  return a.other_teeth == b.other_teeth && a.behind_shaft == b.behind_shaft;
+}
+
 const Misfit& misfit(const Hypothesis& h) {
   return h.fitted->misfit;
 }

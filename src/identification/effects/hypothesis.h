@@ -39,6 +39,7 @@ struct Hypothesis {
   std::shared_ptr<const BandFit> fitted;    // with the effects; base if there are none
   std::vector<Effect> effects;
   bool other_teeth = false;              // not those that the rig file declares
+  bool behind_shaft = false;             // the load, which the rig file declares on the gear
   std::map<std::string, double> held;    // parameters of the machine that are no longer fitted, and where
   std::vector<RejectedEffect> rejected;  // the latest last
 };
@@ -54,6 +55,8 @@ struct SearchContext {
   std::function<void(const Hypothesis&)> report_hypothesis;  // one that was fitted
 };
 
+/// Whether teeth and shafts are of the same kind.
+bool same_machine(const Hypothesis& a, const Hypothesis& b);
 const Misfit& misfit(const Hypothesis& h);
 /// Of the misfit, of both channels.
 double size(const Hypothesis& h);

@@ -85,7 +85,7 @@ std::optional<Hypothesis> plain_effects(Hypothesis& declared, const ServoData& u
 /// Friction that is held at zero was negative because something else is missing, and would keep that from
 /// being found.
 Hypothesis with_free_friction(const Hypothesis& h, const Hypothesis& declared, const SearchContext& context) {
-  if (h.held.empty() || h.other_teeth != declared.other_teeth) return h;
+  if (h.held.empty() || !same_machine(h, declared)) return h;
   Hypothesis free = h;
   free.declared = declared.declared;
   free.held.clear();
@@ -105,7 +105,7 @@ bool takes_half(const Misfit& before, const Misfit& after, double half) {
 Hypothesis with_hidden_effects(const Hypothesis& plain, const Hypothesis& declared, const ServoData& unseen,
                                const SearchContext& context) {
   const Hypothesis more = add_effects_or_teeth(with_free_friction(plain, declared, context), context);
-  if (more.effects.size() > plain.effects.size() || more.other_teeth != plain.other_teeth) {
+  if (more.effects.size() > plain.effects.size() || !same_machine(more, plain)) {
     Hypothesis believed = believe_all(more, declared, unseen, context);
     const bool teeth = believed.effects.size() == plain.effects.size() &&
                        size(believed) < context.settings.revision.clearly_less * size(plain);
@@ -143,11 +143,12 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
   }
   Hypothesis machine = result.declared;
   auto plain = plain_effects(machine, unseen, context);
-  if (!plain)  // where the teeth are not as declared, no effect is what it seems
-    if (auto other = with_other_teeth(machine, context)) {
-      machine = std::move(*other);
-      plain = plain_effects(machine, unseen, context);
-    }
+  while (!plain) {  // where teeth or shafts are not as declared, no effect is what it seems
+    auto other = with_other_machine(machine, context);
+    if (!other) break;
+    machine = std::move(*other);
+    plain = plain_effects(machine, unseen, context);
+  }
   if (plain) {
     const auto other = any_stands_in_for_teeth(*plain) ? with_other_teeth(*plain, context) : std::nullopt;
     result.found = with_hidden_effects(

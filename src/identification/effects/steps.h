@@ -24,12 +24,19 @@ Hypothesis add_plain_effect(const Hypothesis& h, const SearchContext& context);
 Hypothesis add_effect(const Hypothesis& h, const SearchContext& context);
 /// Named effects until nothing helps.
 Hypothesis add_effects(const Hypothesis& h, const SearchContext& context);
-/// The same; where mesh hardening is found, and once more beside all effects, other teeth are tried.
+/// The same; where mesh hardening is found, and once more beside all effects, a shaft before
+/// the load and other teeth are tried.
 Hypothesis add_effects_or_teeth(const Hypothesis& h, const SearchContext& context);
 
 /// Hertzian teeth before a spring instead of linear ones, and of mesh hardening, which they look like.
 /// Nothing where they leave more than mesh hardening, or not clearly less where there is none.
 std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context);
+
+/// The load behind a shaft, with bearing and encoder before it. Nothing where that does not leave clearly
+/// less of the records, and less of the unseen one.
+std::optional<Hypothesis> with_shaft(const Hypothesis& h, const SearchContext& context);
+/// The better of both.
+std::optional<Hypothesis> with_other_machine(const Hypothesis& h, const SearchContext& context);
 
 /// With other values of the shapes that are chosen and not fitted, such as an exponent, where they leave
 /// less.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/effects/traced_rig.h"
 
+#include <fmt/format.h>
+
 #include <sstream>
 #include <vector>
 
@@ -44,6 +46,13 @@ std::string traced_rig_text(const rig_file::RigFile& declared, const Trace& trac
     document.set_contact_law(contact);
     units[rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness).name] +=
         "^1.5";
+  }
+  const model::Coupling& shaft = trace.augmented.output_coupling;
+  if (shaft.rigid != declared.rig.output_coupling.rigid) {
+    document.set("gear_train.output_coupling",
+                 fmt::format("{{stiffness: {:.6g}, damping: 0, bearing: gear}}", shaft.stiffness));
+    if (!(declared.rig.gear.inertia > 0))
+      document.set("gear_train.gear", fmt::format("{{inertia: {:.6g}}}", trace.augmented.gear.inertia));
   }
   document.set_fitted({trace.augmented, declared.rig.motor_axis_ratio(), trace.parameters, units});
   document.set_whole_path_of_test_runs();

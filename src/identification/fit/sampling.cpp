@@ -138,7 +138,8 @@ SamplingEffect sampling_effect(const MachineFit& fit, const RecordSet& records) 
   const Machine& machine = fit.machine;
   const Eigen::Index n = fit.fit.values.size();
   SamplingEffect effect = {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n)};
-  if (!simulation::load_moves_freely(machine.rig) || machine.rig.coupled || machine.deflection_only)
+  if (!simulation::load_moves_freely(machine.rig) || !machine.rig.output_coupling.rigid ||
+      machine.rig.coupled || machine.deflection_only)
     return effect;
   std::vector<ServoData> sampled;
   std::vector<double> motor_steps, load_steps;

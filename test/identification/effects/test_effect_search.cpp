@@ -207,6 +207,24 @@ TEST(EffectSearch, TeethOfAnotherShapeAloneAreNoHardening) {
   expect_at_floor(trace);
 }
 
+// The rig file puts bearing and encoder on the load; they stand before a shaft that turns it.
+TEST(EffectSearch, ALoadBehindAShaftIsNoEffect) {
+  const model::Rig machine = test::servo_behind_shaft(0.01);
+  const Trace trace = traced(records_of(machine));
+  EXPECT_EQ(trace.verdict, TraceVerdict::nothing_missing);
+  EXPECT_EQ(found(trace), std::set<std::string>{});
+  ASSERT_EQ(trace.notes.size(), 1u);
+  EXPECT_TRUE(trace.augmented.bearing_at_gear);
+  // The fit's gear has no mass: a tenth.
+  for (const auto& [name, value] : {std::pair{"output_stiffness", 1.2e6},
+                                    {"mesh_stiffness", 400e3},
+                                    {"load_inertia", 84.0},
+                                    {"motor_inertia", 7.8},
+                                    {"load_coulomb", 18.0}})
+    EXPECT_NEAR(trace.parameters.at(name).value, value, 0.1 * value) << name;
+  EXPECT_GT(trace.channels.at("deflection").before, 5 * trace.channels.at("deflection").after);
+}
+
 // All teeth lose some per cent; 15 % is more than usual.
 class EffectSearchOfLoss : public testing::TestWithParam<double> {};
 

@@ -212,5 +212,19 @@ TEST(TracedRig, TakesMapsAndListsInBrackets) {
   EXPECT_EQ(hertz.rig.mesh.contact_spec().values, trace.augmented.mesh.contact_spec().values);
 }
 
+TEST(TracedRig, WritesAShaftBeforeTheLoad) {
+  const rig_file::RigFile declared = rig_file::rig_file_from_text(config("two_inertia_servo"), "rig.yaml");
+  Trace trace = found(declared.rig, {"mesh_stiffness"}, {});
+  trace.augmented.output_coupling = {false, 1.3e6, 0, 0};
+  trace.augmented.bearing_at_gear = true;
+  trace.augmented.gear.inertia = 0.4;
+  trace.parameters["output_stiffness"] = {1.3e6, 2e4};
+  trace.units["output_stiffness"] = "N m/rad";
+  const model::Rig rig = rig_file::rig_file_from_text(traced_rig_text(declared, trace), "rig.yaml").rig;
+  EXPECT_TRUE(rig.output_coupling == trace.augmented.output_coupling);
+  EXPECT_TRUE(rig.bearing_at_gear);
+  EXPECT_EQ(rig.gear.inertia, 0.4);
+}
+
 }  // namespace
 }  // namespace backlash::identification

@@ -1,21 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 
+#include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
 #include "contact_shape.h"
 #include "effect_roles.h"
 #include "steps.h"
+#include "unseen_record.h"
 
 namespace backlash::identification {
 namespace {
 
-/// The declared machine with other teeth, a start for fits.
-Machine declared_with(const model::Rig& teeth, const Machine& declared) {
+constexpr double kOfGear = 0.01;  // choice: of the link's inertia, of a gear that has none of its own
+constexpr double kShaft = 4;      // choice: times as stiff as the teeth, a start
+
+/// The declared machine with other teeth or shafts, a start for fits.
+Machine declared_with(const model::Rig& other, const Machine& declared) {
   Machine machine = declared;
-  machine.rig = teeth;
+  machine.rig = other;
   for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     // A machine that lacks effects may have been fitted with friction below zero.
-    if (p.is_friction() && p.get(teeth) <= 0) p.set(machine.rig, p.get(declared.rig));
+    if (p.is_friction() && p.get(other) <= 0) p.set(machine.rig, p.get(declared.rig));
   }
   machine.parameters = declared_parameters(machine.rig);
   return machine;
@@ -30,16 +37,16 @@ std::vector<Effect> without_stand_ins_for_teeth(std::vector<Effect> effects) {
 }
 
 /// Of each effect the machine with those before it is kept, which the unseen record compares: all of these
-/// have the other teeth.
-std::optional<Hypothesis> fitted_with(const model::Rig& teeth, const std::vector<Effect>& effects,
+/// are of the other machine.
+std::optional<Hypothesis> fitted_with(const model::Rig& rig, const std::vector<Effect>& effects,
                                       const Hypothesis& h, const SearchContext& context) {
   Hypothesis other = h;
-  other.declared = std::make_shared<const Machine>(declared_with(teeth, *h.declared));
-  other.base = std::make_shared<const BandFit>(fit_to_records(
-      context.data, *other.declared, context.settings.fit, [&] { context.report("trying other teeth"); }));
+  other.declared = std::make_shared<const Machine>(declared_with(rig, *h.declared));
+  other.base = std::make_shared<const BandFit>(
+      fit_to_records(context.data, *other.declared, context.settings.fit,
+                     [&] { context.report("trying other teeth and shafts"); }));
   other.fitted = other.base;
   other.effects.clear();
-  other.other_teeth = true;
   for (const Effect& effect : effects) {
     std::vector<Effect> more = other.effects;
     more.push_back(effect);
@@ -90,7 +97,36 @@ bool rather_linear(const Hypothesis& other, const Hypothesis& h, const SearchCon
   return false;
 }
 
+/// Bearing and encoder before a shaft that turns the load; a start for fits.
+std::optional<model::Rig> before_shaft(model::Rig rig, double torque) {
+  if (!rig.output_coupling.rigid || !simulation::load_moves_freely(rig)) return std::nullopt;
+  rig.output_coupling.stiffness = kShaft * torque / model::GearTrain(rig).elastic_deflection(torque);
+  rig.output_coupling.rigid = false;
+  rig.bearing_at_gear = true;
+  if (!(rig.gear.inertia > 0)) rig.gear.inertia = kOfGear * rig.link.inertia;
+  return rig;
+}
+
+/// Times the noise, of both channels of the unseen record.
+double left_unseen(const Hypothesis& h, const SearchContext& context) {
+  const ServoPrediction p = predicted(h.fitted->fit.machine, context.unseen, context.settings.fit);
+  return std::hypot(p.torque_error.error / p.torque_error.floor,
+                    p.deflection_error.error / p.deflection_error.floor);
+}
+
 }  // namespace
+
+std::optional<Hypothesis> with_shaft(const Hypothesis& h, const SearchContext& context) {
+  if (clearly_right(misfit(h), context)) return std::nullopt;
+  const auto rig = before_shaft(h.base->fit.machine.rig, context.range.torque);
+  if (!rig) return std::nullopt;
+  auto other = attempted([&] { return fitted_with(*rig, h.effects, h, context); });
+  if (!other || !*other || size(**other) >= context.settings.revision.clearly_less * size(h))
+    return std::nullopt;
+  if (left_unseen(**other, context) >= left_unseen(h, context)) return std::nullopt;
+  (*other)->behind_shaft = true;
+  return *other;
+}
 
 std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context) {
   const std::vector<Effect> others = without_stand_ins_for_teeth(h.effects);
@@ -106,11 +142,17 @@ std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchCont
     return std::nullopt;
   if (!harden && rather_linear(*other, h, context)) return std::nullopt;
   Hypothesis result = *other;
+  result.other_teeth = true;
   for (const Effect& effect : h.effects)
     if (stands_in_for_contact_law(effect.candidate.id))
       result = with_rejected(std::move(result), effect.candidate.id,
                              "teeth of another law (Hertzian) explain it better");
   return result;
+}
+
+std::optional<Hypothesis> with_other_machine(const Hypothesis& h, const SearchContext& context) {
+  auto teeth = with_other_teeth(h, context), shaft = with_shaft(h, context);
+  return shaft && (!teeth || size(*shaft) < size(*teeth)) ? shaft : teeth;
 }
 
 }  // namespace backlash::identification
