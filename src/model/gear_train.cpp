@@ -13,7 +13,6 @@ namespace {
 constexpr int kMostSteps = 60;        // theory: 2^-60 where friction grows by half of the torque
 constexpr double kSettled = 1e-12;    // theory: relative, above roundings
 constexpr double kWithinReach = 0.1;  // share of the half gap; a flank that moves by less cannot touch
-
 constexpr TrainLayout kFollowingLoad = TrainLayout::following_load();
 
 TrainLayout layout_of(const Rig& rig) {

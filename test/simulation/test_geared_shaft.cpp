@@ -10,7 +10,7 @@ namespace backlash::simulation {
 namespace {
 
 constexpr double kTeeth = 4e4, kShaft = 9e4, kHalfGap = 5e-4, kFriction = 1.5;  // N m/rad, rad, N m
-constexpr GearedShaft shaft{kShaft};
+constexpr GearedShaft kOnShaft{kShaft};
 
 /// N m, with the motor there and the gear here.
 double through_teeth(double motor, double gear) {
@@ -24,7 +24,7 @@ Gear moved(const Gear& before, double guess, double motor, double link) {
     forces.mesh_torque = through_teeth(motor, gear);
     return forces;
   };
-  const Gear gear = shaft.follow(before, guess, link, at);
+  const Gear gear = kOnShaft.follow(before, guess, link, at);
   EXPECT_EQ(forces.mesh_torque, through_teeth(motor, gear.position)) << "was asked last elsewhere";
   return gear;
 }

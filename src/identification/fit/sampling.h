@@ -23,7 +23,8 @@ struct SamplingEffect {
 /// records with positions rounded as the encoders round them differ from b by what rounding does: where a
 /// machine stands, or comes by the same places again, its errors are the same each time, and no noise. Over
 /// phases of the grid that is a covariance; an encoder whose white noise exceeds its rounding has none. 0
-/// where the load has no motion of its own, other axes move the machine, or it cannot be simulated.
+/// where the load has no motion of its own or turns behind a shaft (the fit's gear has no mass), other axes
+/// move the machine, or it cannot be simulated.
 SamplingEffect sampling_effect(const MachineFit& fit, const RecordSet& records);
 
 }  // namespace backlash::identification
