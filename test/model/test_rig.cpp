@@ -108,6 +108,14 @@ TEST(Rig, MeshWithoutBaseRadiusWorksInAngles) {
   EXPECT_EQ(rig.backlash_angle(3e-3), 3e-3);
 }
 
+TEST(Rig, TheBearingIsAtTheLinkUnlessItIsSaidToBeAtTheGear) {
+  EXPECT_FALSE(parse(kRig).bearing_at_gear);
+  EXPECT_FALSE(parse(changed("damping: 0.05}", "damping: 0.05, bearing: link}")).bearing_at_gear);
+  const std::string at_gear = changed("damping: 0.05}", "damping: 0.05, bearing: gear}");
+  EXPECT_TRUE(parse(at_gear).bearing_at_gear);
+  EXPECT_FALSE(parse(at_gear) == parse(kRig));
+}
+
 TEST(Rig, OptionalPartsMayBeLeftOut) {
   const Rig rigid_input =
       parse(changed("{stiffness: 28, damping: 0.01, inertia: 4e-6}\n  pinion: {inertia: 3e-5}", "rigid"));
@@ -188,6 +196,8 @@ const BadRig kWrongShapes[] = {
     {", alpha: 0.5", "", "rig.yaml:12: gear_train.mesh.contact.alpha: is missing, expected a number"},
     {"  gear: {inertia: 5e-5, viscous_damping: 0.001}\n", "",
      "rig.yaml:3: gear_train.gear: is required with a flexible output coupling"},
+    {"damping: 0.05}\n  link: {inertia: 7e-4}", "damping: 0.05, bearing: gear}\n  link: locked",
+     "rig.yaml:15: gear_train.link = locked: a locked link has no bearing at the gear"},
     {"link: {inertia: 7e-4}", "link: loose", "rig.yaml:15: gear_train.link = loose: must be one of locked"},
     {"  link: {inertia: 7e-4}\n", "", "rig.yaml:3: gear_train.link: is missing, expected a map"},
     {"id: gravity, amplitude: 2", "id: antigravity, amplitude: 2",
