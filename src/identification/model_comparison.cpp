@@ -107,14 +107,20 @@ class FreeRuns {
   }
 
   void run(const Engagement& e) {
+    const auto speeds = std::size_t(plant_.gear_train().dof());  // 3 with a load behind a shaft
+    simulation::Plant::State start{record_.data.motor[e.from]};
+    start[speeds] = record_.data.motor_rate[e.from];
+    for (std::size_t body = 1; body < speeds; ++body) {
+      start[body] = followed_.load[e.from];
+      start[speeds + body] = followed_.load_rate[e.from];
+    }
     plant_.reset();
-    plant_.set_state({record_.data.motor[e.from], followed_.load[e.from], record_.data.motor_rate[e.from],
-                      followed_.load_rate[e.from]});
+    plant_.set_state(start);
     for (std::size_t k = e.from; k < e.to; ++k) {
       const simulation::Plant::State& s = plant_.state();
-      motor_speed[k] = s[2];
+      motor_speed[k] = s[speeds];
       deflection[k] = s[0] - s[1] - offset_;
-      speed_difference[k] = s[2] - s[3];
+      speed_difference[k] = s[speeds] - s[speeds + 1];
       plant_.set_torque(torque_[k]);
       plant_.advance_to(double(k + 1 - e.from) * record_.data.interval);
     }
