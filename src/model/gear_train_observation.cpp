@@ -72,7 +72,7 @@ double GearTrain::elastic_deflection(double motor_torque) const {
   const double torque = std::fabs(motor_torque) * ratio_;
   double angle = contact_ ? contact_->static_penetration(torque / lever_) / lever_ : 0;
   if (layout_.input_gives) angle += torque / equations_.input_stiffness;
-  if (layout_.output_gives) angle += torque / equations_.output_stiffness;
+  if (layout_.output_gives && load_end_ == kLink) angle += torque / equations_.output_stiffness;
   return std::copysign(angle * ratio_, motor_torque);
 }
 

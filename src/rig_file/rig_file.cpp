@@ -60,8 +60,9 @@ bool fill_contact(const model::Mesh& mesh, diagnosis::WaveformSettings& s) {
 /// For a rig that the estimator's equations describe; nothing for any other.
 std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   const model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
-  if (in.rigid || (out.rigid && rig.link_locked) || rig.mesh.rigid || rig.mesh.variation || rig.mesh.pairs ||
-      rig.motor_axis_ratio() != 1 || rig.linear || !rig.terms.empty() || rig.coupled)
+  if (in.rigid || (out.rigid && rig.link_locked) || rig.bearing_at_gear || rig.mesh.rigid ||
+      rig.mesh.variation || rig.mesh.pairs || rig.motor_axis_ratio() != 1 || rig.linear ||
+      !rig.terms.empty() || rig.coupled)
     return std::nullopt;
   if (rig.pinion.viscous_damping != 0 || rig.gear.viscous_damping != 0 || rig.motor.viscous_asymmetry != 0 ||
       rig.motor.coulomb_asymmetry != 0 || rig.link.viscous_asymmetry != 0 || rig.link.coulomb_asymmetry != 0)
@@ -107,13 +108,15 @@ diagnosis::GapTraverseSettings::Flank flank_under(const model::ContactLaw& law, 
 /// The same, with its values at the axis of motor_position.
 std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
     const model::Rig& rig, const std::shared_ptr<const model::GearTrain>& train) {
-  if (rig.link_locked || !rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.linear ||
-      rig.coupled || rig.mesh.variation || rig.mesh.pairs || rig.mesh.contact->needs_impact_speed())
+  // Where the load is shown at its gear, a shaft behind that is not between what the encoders show.
+  const bool on_gear = rig.output_coupling.rigid || rig.bearing_at_gear;
+  if (rig.link_locked || !rig.input_coupling.rigid || !on_gear || rig.linear || rig.coupled ||
+      rig.mesh.variation || rig.mesh.pairs || rig.mesh.contact->needs_impact_speed())
     return std::nullopt;
   const double ratio = rig.motor_axis_ratio(), lever = rig.mesh.lever() / ratio;
   diagnosis::GapTraverseSettings s;
   s.motor_inertia = rig.motor.inertia + rig.pinion.inertia;
-  s.load_inertia = (rig.gear.inertia + rig.link.inertia) / (ratio * ratio);
+  s.load_inertia = (rig.gear.inertia + rig.output_coupling.inertia + rig.link.inertia) / (ratio * ratio);
   s.motor_damping = rig.motor.viscous_damping + rig.pinion.viscous_damping;
   s.motor_friction = rig.motor.coulomb_friction;
   s.load_friction = rig.link.coulomb_friction / ratio;

@@ -134,6 +134,21 @@ TEST(RigFile, MotorSideAxisScalesBaseRadiusAndDeflection) {
               1e-15);
 }
 
+// The encoders are before the shaft: what they show is as without it. Behind it they show both.
+TEST(RigFile, AShaftBehindTheLoadsEncoderChangesNoDeflection) {
+  const auto with_shaft = [](const std::string& bearing) {
+    const std::string shaft =
+        "{stiffness: 2.0e3, damping: 0, bearing: " + bearing + "}\n  gear: {inertia: 1.0e-4}";
+    return load(replaced(kTwoInertias, "output_coupling: rigid", "output_coupling: " + shaft)).diagnosis;
+  };
+  const auto at_gear = with_shaft("gear"), at_link = with_shaft("link");
+  ASSERT_TRUE(at_gear.gap_traverse);
+  EXPECT_DOUBLE_EQ(at_gear.gap_traverse->load_inertia, 0.01 + 1e-4);
+  EXPECT_NEAR(at_gear.lost_motion->elastic_deflection(0.5), 0.5 / (1e7 * 0.02 * 0.02), 1e-15);
+  EXPECT_FALSE(at_link.gap_traverse);
+  EXPECT_NEAR(at_link.lost_motion->elastic_deflection(0.5), 0.5 / (1e7 * 0.02 * 0.02) + 0.5 / 2e3, 1e-15);
+}
+
 // Hertz's contact in series with a spring, F = T / r: d = F / Ks + (F / K)^(2/3), and a damper.
 TEST(RigFile, GapTraverseKnowsTeethThatAreNoSpringUnderATorque) {
   const RigFile file =

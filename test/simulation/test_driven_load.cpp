@@ -49,9 +49,9 @@ TEST(DrivenLoad, RepeatsTheWholeTrain) {
 }
 
 // As RepeatsTheWholeTrain; without friction nothing wears an impact's error off, and the load drifts.
-TEST(DrivenLoad, ALoadWithoutFrictionRepeatsTheWholeTrain) {
+TEST(DrivenLoad, WithoutDryFrictionItRepeatsTheWholeTrain) {
   model::Rig rig = other_servo();
-  rig.link.coulomb_friction = 0;
+  rig.motor.coulomb_friction = rig.link.coulomb_friction = 0;
   const record::Record record = simulate_record(rig, test::servo_run(3, false), 5);
   const DrivenLoad driven = simulate_driven_load(rig, motion_of(record));
   EXPECT_LT(worst(driven.load, record.column(record::Channel::load_position)), 2e-4);

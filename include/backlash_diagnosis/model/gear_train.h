@@ -131,7 +131,8 @@ class GearTrain : private TrainParts {
   /// Power dissipated by the dampers of motor, couplings and link [W], without that of contact damping.
   double damping_power(const double* state) const;
 
-  /// Twist between motor and link under a static torque with one flank pressed, without the gap. Torque and
+  /// Twist between motor and link (gear, if the load is shown there) under a static torque with one flank
+  /// pressed, without the gap. Torque and
   /// angle in the units of motor_torque and motor_position; odd in torque. With the mean stiffness of the
   /// mesh cycle.
   double elastic_deflection(double motor_torque) const;

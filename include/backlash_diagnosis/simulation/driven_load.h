@@ -9,11 +9,11 @@
 // model.
 //
 // Behind a flexible output coupling with the bearing at the gear (Rig::bearing_at_gear) the load is
-//   J_L w' = k (q_G - q_L) - c_L w + terms + J_L k (w_rec - w_G),   T_mesh(q_M, q_G) - R = k (q_G - q_L), |R|
-//   <= F_L
+//   J_L w' = k_O (q_G - q_L) - c_L w + terms + J_L k (w_rec - w_G)
+//   T_mesh(q_M, q_G) - R = k_O (q_G - q_L)        |R| <= F_L
 // with J_L of gear and link: the gear q_G, which the encoder shows, is massless and moves no farther than it
 // must to keep the friction R of its bearing within the limit. Right for motions slow beside the gear's own
-// between teeth and coupling. Damping of the coupling is left out.
+// between teeth and coupling. Damping of the coupling and presliding of the bearing are left out.
 //
 // Where the link is locked or the mesh rigid the load has no motion of its own: it stands, or moves with the
 // motor, and only the torque on the motor is computed.
