@@ -87,18 +87,34 @@ struct alignas(sizeof(Real)) PlainLoad {
     Real net, mesh_torque;  // N m, without dry friction
   };
 
-  BACKLASH_LANES Forces forces(const Moment& m, const Real& position, const Real& rate) const {
-    const Real motor = Real{} + m.motor, motor_rate = Real{} + m.motor_rate, none = {};
-    const typename model::EquationsOfMotion<Real>::PartMotion s = {{motor, motor, position, position},
-                                                                   {motor_rate, motor_rate, rate, rate}};
-    const Real mesh_torque =
-        train.lever * teeth.force(train.gap_position(s, teeth.half_gap), train.gap_rate(s));
+  /// N m, through the teeth with the gear there.
+  BACKLASH_LANES Real mesh_torque(const Moment& m, const Real& position, const Real& rate) const {
+    const typename model::EquationsOfMotion<Real>::PartMotion s = moving(m, position, rate);
+    return train.lever * teeth.force(train.gap_position(s, teeth.half_gap), train.gap_rate(s));
+  }
+
+  /// N m, of the teeth, of dampers and of what draws the load.
+  BACKLASH_LANES Real net(const Moment& m, const Real& rate, const Real& mesh_torque) const {
+    const Real none = {};
     Real net[kParts];
     const auto mesh = [&](Real * torque) __attribute__((always_inline)) {
       train.add_mesh(mesh_torque, torque);
     };
-    train.net_torques(kFollowing, s, none, none, mesh, net);
-    return {net[kFollowing.node[model::TrainParts::kLink]] + drawn * (m.load_rate - rate), mesh_torque};
+    train.net_torques(kFollowing, moving(m, none, rate), none, none, mesh, net);
+    return net[kFollowing.node[model::TrainParts::kLink]] + drawn * (m.load_rate - rate);
+  }
+
+  BACKLASH_LANES Forces forces(const Moment& m, const Real& position, const Real& rate) const {
+    const Real torque = mesh_torque(m, position, rate);
+    return {net(m, rate, torque), torque};
+  }
+
+ private:
+  static BACKLASH_LANES typename model::EquationsOfMotion<Real>::PartMotion moving(const Moment& m,
+                                                                                   const Real& position,
+                                                                                   const Real& rate) {
+    const Real motor = Real{} + m.motor, motor_rate = Real{} + m.motor_rate;
+    return {{motor, motor, position, position}, {motor_rate, motor_rate, rate, rate}};
   }
 };
 

@@ -48,26 +48,30 @@ class FreeLoad {
       : train_(load_as_one(rig)),
         inertia_(train_.load_inertia()),
         feedback_(feedback),
-        shaft_{rig.output_coupling.rigid ? 0 : rig.output_coupling.stiffness},
-        rubs_(train_.friction_event_count() > 0 && !shaft_),
+        behind_shaft_(!rig.output_coupling.rigid),
+        rubs_(train_.friction_event_count() > 0 && !behind_shaft_),
         shaped_(train_.flanks_shift_with_position()),
         plain_(train_.plain_load()) {
+    geared_.shaft.stiffness = behind_shaft_ ? rig.output_coupling.stiffness : 0;
     if (!plain_) return;
     const model::PowerContact law = *train_.power_contact();
-    forces_ = {train_.equations(),
-               {law.exponent, law.stiffness, law.loss, law.damping, 0.5 * train_.backlash()},
-               inertia_,
-               inertia_ * feedback_};
-    friction_ = train_.load_forces({}).friction;
+    geared_.plain = {train_.equations(),
+                     {law.exponent, law.stiffness, law.loss, law.damping, 0.5 * train_.backlash()},
+                     inertia_,
+                     inertia_ * feedback_};
+    const model::FrictionLimits friction = train_.load_forces({}).friction;
+    geared_.forward = friction.forward;
+    geared_.backward = friction.backward;
+    if (!behind_shaft_) friction_ = friction;
   }
 
   double q = 0, w = 0;
 
   /// rad: what an encoder shows.
-  double shown() const { return shaft_ ? last_.gear.position : q; }
+  double shown() const { return behind_shaft_ ? last_.gear.position : q; }
 
   double begin(const Segment& s) {
-    last_.gear.position = last_.position = q;
+    last_.gear.position = q;
     last_ = forces(s.at(0), q, w, last_);
     mode_.begin(last_.net, w, last_.friction, q);
     return last_.mesh_torque;
@@ -88,19 +92,20 @@ class FreeLoad {
 
   /// Whether it can move beside another: in sliding with the same friction all along.
   bool joins(const FreeLoad& other) const {
-    return plain_ && !shaft_ && !(friction_.presliding > 0) &&
-           forces_.teeth.exponent == other.forces_.teeth.exponent;
+    return plain_ && behind_shaft_ == other.behind_shaft_ && !(friction_.presliding > 0) &&
+           geared_.plain.teeth.exponent == other.geared_.plain.teeth.exponent;
   }
-  const PlainLoad<double>& plain_forces() const { return forces_; }
+  const GearedLoad<double>& plain_load() const { return geared_; }
+  bool behind_shaft() const { return behind_shaft_; }
   bool stuck() const { return mode_.stuck(); }
   int stops_against() const { return rubs_ ? mode_.direction() : 0; }
   double friction() const { return mode_.torque(friction_); }
-  PlainLoad<double>::Forces last() const { return {last_.net, last_.mesh_torque}; }
+  GearedLoad<double>::Forces last() const { return {{last_.net, last_.mesh_torque}, last_.gear}; }
   /// Goes on from where it has slid to beside others.
-  void slid_to(double position, double rate, const PlainLoad<double>::Forces& f) {
+  void slid_to(double position, double rate, const GearedLoad<double>::Forces& f) {
     q = position;
     w = rate;
-    last_ = {{f.net, f.mesh_torque, -f.mesh_torque, friction_}, position, rate, {position}};
+    last_ = of_plain(f, position, rate);
     flanks_.reset();
   }
 
@@ -110,7 +115,7 @@ class FreeLoad {
   using Flanks = std::optional<model::GearTrain::Flanks>;
   struct Forces : model::GearTrain::LoadForces {  // net with what draws the load
     double position, rate;                        // rad, rad/s, of the load
-    Gear gear;
+    Gear<double> gear;
     int side() const { return (mesh_torque > 0) - (mesh_torque < 0); }
   };
   struct Move {
@@ -126,28 +131,36 @@ class FreeLoad {
     return f.net < f.friction.forward && -f.net < f.friction.backward;
   }
 
+  Forces of_plain(const GearedLoad<double>::Forces& f, double position, double rate) const {
+    return {{f.net, f.mesh_torque, -f.mesh_torque, friction_}, position, rate, f.gear};
+  }
+
   /// `before`: those of a moment before. `flanks`: where they are at nearly this position, if known.
   Forces forces(const Moment& m, double position, double rate, const Forces& before,
                 const Flanks& flanks = {}) const {
-    if (!shaft_) return {acting(m, position, rate, flanks), position, rate, {position}};
-    const double gear_rate = shaft_.rate(before.gear, before.side() != 0, m.motor_rate, rate);
+    if (!plain_)
+      return behind_shaft_ ? through_gear(m, position, rate, before, flanks)
+                           : Forces{acting(m, position, rate, flanks), position, rate, {}};
+    if (!behind_shaft_) return of_plain({geared_.plain.forces(m, position, rate), {}}, position, rate);
+    const GearedLoad<double>::Forces from{{before.net, before.mesh_torque}, before.gear};
+    return of_plain(geared_.forces(m, position, rate, from), position, rate);
+  }
+
+  Forces through_gear(const Moment& m, double position, double rate, const Forces& before,
+                      const Flanks& flanks) const {
+    const double gear_rate = geared_.shaft.rate(before.gear, before.mesh_torque, m.motor_rate, rate);
     model::GearTrain::LoadForces f;
-    const auto with_gear_at = [&](double gear) -> const model::GearTrain::LoadForces& {
-      return f = acting(m, gear, gear_rate, flanks);
-    };
-    const double guess = before.gear.position + position - before.position;
-    const Gear gear = shaft_.follow(before.gear, guess, position, with_gear_at);
-    f.net += shaft_.stiffness * (gear.position - position) - f.mesh_torque;
+    const Gear<double> gear = geared_.shaft.follow(before.gear, position, [&](double at) {
+      f = acting(m, at, gear_rate, flanks);
+      return OnGear<double>{f.mesh_torque, f.friction.forward, f.friction.backward};
+    });
+    f.net += geared_.shaft.stiffness * (gear.position - position) - f.mesh_torque;
     f.friction = {};
     return {f, position, rate, gear};
   }
 
   /// With the gear at this position.
   model::GearTrain::LoadForces acting(const Moment& m, double gear, double rate, const Flanks& flanks) const {
-    if (plain_) {
-      const PlainLoad<double>::Forces f = forces_.forces(m, gear, rate);
-      return {f.net, f.mesh_torque, -f.mesh_torque, friction_};
-    }
     const model::Motion motion{m.time, m.motor, m.motor_rate, gear, rate, 0};
     model::GearTrain::LoadForces f =
         flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion);
@@ -260,10 +273,9 @@ class FreeLoad {
 
   model::GearTrain train_;
   double inertia_, feedback_;
-  GearedShaft shaft_;
-  bool rubs_, shaped_, plain_;
-  PlainLoad<double> forces_{};      // of a plain load
-  model::FrictionLimits friction_;  // of a plain load
+  bool behind_shaft_, rubs_, shaped_, plain_;
+  GearedLoad<double> geared_{};     // beside its shaft that of a plain load
+  model::FrictionLimits friction_;  // of a plain load on the gear
   model::StickSlip mode_;
   Forces last_{};  // at the end of the sample before
   Flanks flanks_;  // there, if known

@@ -1,80 +1,106 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A gear whose bearing and encoder stand before the shaft that turns the load. It is massless beside the
-// load:
+// A gear whose bearing and encoder stand before the shaft that turns the load, for one load (Real = double)
+// and for several side by side (lanes, whose header stands before this one). It is massless beside the load:
 //   T(q_M - q_G) - R = k (q_G - q_L)        T through the teeth, R dry friction of its bearing
 // It stands while -F_- <= R <= F_+, and moves no farther than it must to keep R within: a play operator
 // (Prandtl 1928; Visintin 1994, ch. III).
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
-#include "backlash_diagnosis/model/gear_train.h"
+#include "driven_step.h"
+#include "one_lane.h"
 
 namespace backlash::simulation {
 
-struct Gear {
-  double position = 0;  // rad
-  int slides = 0;       // +1, -1: which way; 0: it stands
-  double slope = 0;     // N m/rad, of shaft and teeth where these touch; 0: not known
+template <typename Real>
+struct alignas(sizeof(Real)) Gear {
+  Real position = {};  // rad
+  Real slides = {};    // +1, -1: which way; 0: it stands
+  Real slope = {};     // N m/rad, of shaft and teeth where these touch; 0: not known
 };
 
-struct GearedShaft {
-  double stiffness = 0;  // N m/rad, of the shaft; 0: there is none, the gear is the load
+/// N m: through the teeth, and what the bearing holds either way.
+template <typename Real>
+struct alignas(sizeof(Real)) OnGear {
+  Real mesh_torque, forward, backward;
+};
 
-  explicit operator bool() const { return stiffness > 0; }
+template <typename Real>
+struct alignas(sizeof(Real)) GearedShaft {
+  Real stiffness = {};  // N m/rad, of the shaft; 0: there is none, the gear is the load
 
-  /// rad/s, of the gear as its balance changes; `touches`: whether teeth do.
-  double rate(const Gear& gear, bool touches, double motor_rate, double link_rate) const {
-    if (gear.slides == 0) return 0;
-    if (!touches) return link_rate;
-    return motor_rate + stiffness / std::max(gear.slope, stiffness) * (link_rate - motor_rate);
+  /// rad/s, of the gear as its balance changes; `mesh_torque` at that moment.
+  BACKLASH_LANES Real rate(const Gear<Real>& gear, const Real& mesh_torque, const Real& motor_rate,
+                           const Real& link_rate) const {
+    const Real none = {}, with_teeth = stiffness / larger(gear.slope, stiffness) * (link_rate - motor_rate);
+    const Real sliding = magnitude(mesh_torque) > none ? motor_rate + with_teeth : link_rate;
+    return magnitude(gear.slides) > none ? sliding : none;
   }
 
-  /// The gear after a moment in which it was as `before`, with the link at `link` and `guess` [rad] where the
-  /// gear may be now. `forces(q)` are those on the load with the gear at q; it is asked last where the gear
-  /// is. The torque through the teeth falls with q.
-  template <typename ForcesAt>
-  Gear follow(const Gear& before, double guess, double link, const ForcesAt& forces) const {
-    const auto balance = [&](double q, int way) {
-      const model::GearTrain::LoadForces& f = forces(q);
-      const double limit = way > 0 ? f.friction.forward : -f.friction.backward;
-      return Balance{f.mesh_torque - stiffness * (q - link) - limit, f.mesh_torque != 0};
+  /// The gear after a moment in which it was as `before`, with the link at `link`. `acting(q)` is what acts
+  /// with the gear at q; it is asked last where the gear is. The torque through the teeth falls with q: where
+  /// friction is at its limit is found by a secant within the bracket that the shaft's stiffness alone gives.
+  template <typename ActingAt>
+  BACKLASH_LANES Gear<Real> follow(const Gear<Real>& before, const Real& link, const ActingAt& acting) const {
+    const Real none = {}, sharp = kSharp * stiffness;
+    Real q = before.position, slope = larger(before.slope, stiffness);
+    OnGear<Real> on = acting(q);
+    const auto pull = [&]() __attribute__((always_inline)) {
+      return on.mesh_torque - stiffness * (q - link);
     };
-    if (before.slides != 0) {
-      const Gear on = slid(before, before.slides, guess, balance);
-      if (on.slides * (on.position - before.position) >= 0) return on;
-    }
-    for (const int way : {1, -1})
-      if (way * balance(before.position, way).rubs > 0) return slid(before, way, guess, balance);
-    return {before.position, 0, before.slope};
-  }
-
- private:
-  struct Balance {
-    double rubs;  // N m, beyond the limit of friction
-    bool touches;
-  };
-
-  /// Where friction is at its limit: a secant within the bracket that the shaft's stiffness alone gives.
-  template <typename BalanceAt>
-  Gear slid(const Gear& before, int way, double guess, const BalanceAt& balance) const {
-    double q = guess, slope = std::max(before.slope, stiffness);
-    Balance at = balance(q, way);
-    double low = at.rubs > 0 ? q : q + at.rubs / stiffness, high = at.rubs > 0 ? q + at.rubs / stiffness : q;
-    for (int i = 0; i < kMostSteps && std::fabs(at.rubs) > kSharp * stiffness; ++i) {
-      double next = q + at.rubs / (at.touches ? slope : stiffness);
-      if (!(next > low && next < high)) next = 0.5 * (low + high);
-      const Balance at_next = balance(next, way);
-      if (at.touches && at_next.touches) slope = std::max(stiffness, (at.rubs - at_next.rubs) / (next - q));
-      q = next, at = at_next;
-      (at.rubs > 0 ? low : high) = q;
+    const Real pulls = pull();
+    const Real way = pulls > on.forward ? none + 1 : pulls < -on.backward ? none - 1 : none;
+    const auto beyond = [&]() __attribute__((always_inline)) {
+      const Real over = pull() - (way > none ? on.forward : -on.backward);
+      return magnitude(way) > none ? over : none;
+    };
+    Real rubs = beyond(), low = smaller(q, q + rubs / stiffness), high = larger(q, q + rubs / stiffness);
+    for (int i = 0; i < kMostSteps && any_positive(Real(magnitude(rubs) - sharp)); ++i) {
+      const Real from = q, before_step = rubs, touched = magnitude(on.mesh_torque);
+      const Real step = q + rubs / (touched > none ? slope : stiffness), middle = 0.5 * (low + high);
+      const Real within = step < low ? middle : step > high ? middle : step;
+      q = magnitude(rubs) > sharp ? within : q;
+      on = acting(q);
+      rubs = beyond();
+      const Real found = larger(stiffness, (before_step - rubs) / (q - from));
+      const Real both = smaller(smaller(touched, magnitude(on.mesh_torque)), magnitude(q - from));
+      slope = both > none ? found : slope;
+      low = rubs > none ? q : low;
+      high = rubs > none ? high : q;
     }
     return {q, way, slope};
   }
 
+ private:
   static constexpr int kMostSteps = 60;
   static constexpr double kSharp = 1e-10;  // rad, far below what an encoder shows
+};
+
+/// A plain load behind a shaft.
+template <typename Real>
+struct alignas(sizeof(Real)) GearedLoad {
+  PlainLoad<Real> plain;
+  GearedShaft<Real> shaft;
+  Real forward, backward;  // N m, that the gear's bearing holds
+
+  struct alignas(sizeof(Real)) Forces : PlainLoad<Real>::Forces {
+    Gear<Real> gear;
+  };
+
+  /// `before`: a moment before.
+  BACKLASH_LANES Forces forces(const Moment& m, const Real& position, const Real& rate,
+                               const Forces& before) const {
+    const Real none = {};
+    const Real gear_rate = shaft.rate(before.gear, before.mesh_torque, none + m.motor_rate, rate);
+    Forces f;
+    f.gear = shaft.follow(
+        before.gear, position, [&](const Real& q) __attribute__((always_inline)) {
+          f.mesh_torque = plain.mesh_torque(m, q, gear_rate);
+          return OnGear<Real>{f.mesh_torque, forward, backward};
+        });
+    f.net = plain.net(m, gear_rate, f.mesh_torque) +
+            (shaft.stiffness * (f.gear.position - position) - f.mesh_torque);
+    return f;
+  }
 };
 
 }  // namespace backlash::simulation

@@ -23,13 +23,6 @@ constexpr int kAhead = 4;             // steps that a rig may be ahead of what i
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();  // relative, of times >= 0
 
-template <typename Real>
-bool any_positive(const Real& a) {
-  bool any = false;
-  for (int i = 0; i < kLanesOf<Real>; ++i) any |= lane(a, i) > 0;
-  return any;
-}
-
 /// What is compiled for each processor.
 template <typename Real>
 struct Functions {

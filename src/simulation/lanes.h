@@ -66,4 +66,11 @@ BACKLASH_LANES Lanes any_power(const Lanes& a, double exponent) {
   return r;
 }
 
+template <typename Real>
+BACKLASH_LANES bool any_positive(const Real& a) {
+  bool any = false;
+  for (int i = 0; i < kLanesOf<Real>; ++i) any |= lane(a, i) > 0;
+  return any;
+}
+
 }  // namespace backlash::simulation

@@ -252,14 +252,22 @@ bool same_motion(const DrivenLoad& a, const DrivenLoad& b) {
          a.mesh_on_motor == b.mesh_on_motor;
 }
 
+/// On the gear and behind a shaft, each with linear teeth and with others.
+std::vector<model::Rig> plain_rigs() {
+  std::vector<model::Rig> all = {other_servo(), test::servo_behind_shaft(0.01)};
+  for (int i : {0, 1}) {
+    all.push_back(all[i]);
+    all.back().mesh.contact =
+        model::make_contact_law("hunt_crossley", {{"stiffness", 4e6}, {"exponent", 1.5}, {"alpha", 0.4}});
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].name = std::to_string(i);
+  return all;
+}
+
 // A load of numbers alone is followed by other code than one with terms, which does the same.
 TEST(DrivenLoad, APlainLoadMovesAsTheTrainDoes) {
-  for (const char* law : {"linear", "hunt_crossley"}) {
-    model::Rig rig = other_servo();
+  for (model::Rig rig : plain_rigs()) {
     rig.link.viscous_asymmetry = 0.5;
-    if (law == std::string("hunt_crossley"))
-      rig.mesh.contact =
-          model::make_contact_law(law, {{"stiffness", 4e6}, {"exponent", 1.5}, {"alpha", 0.4}});
     const record::Record record = simulate_record(rig, test::servo_run(3, false), 2);
     model::Rig with_term = rig;
     with_term.terms.push_back(std::make_shared<Nothing>());
@@ -267,17 +275,13 @@ TEST(DrivenLoad, APlainLoadMovesAsTheTrainDoes) {
     EXPECT_FALSE(model::GearTrain(with_term).plain_load());
     EXPECT_TRUE(same_motion(simulate_driven_load(rig, motion_of(record)),
                             simulate_driven_load(with_term, motion_of(record))))
-        << law;
+        << rig.name;
   }
 }
 
 // Number by number, whatever happens to each: other gaps and frictions touch and stick at other samples.
 TEST(DrivenLoad, SeveralAtOnceMoveAsEachAlone) {
-  for (const char* law : {"linear", "hunt_crossley"}) {
-    model::Rig rig = other_servo();
-    if (law == std::string("hunt_crossley"))
-      rig.mesh.contact =
-          model::make_contact_law(law, {{"stiffness", 4e6}, {"exponent", 1.5}, {"alpha", 0.4}});
+  for (const model::Rig& rig : plain_rigs()) {
     const record::Record record = simulate_record(rig, test::servo_run(3, false), 2);
     RecordedMotion motion = motion_of(record);
     motion.load_rate = &record.column(record::Channel::load_velocity);
@@ -288,13 +292,14 @@ TEST(DrivenLoad, SeveralAtOnceMoveAsEachAlone) {
       rigs.back().mesh.backlash *= 0.5 * double(count);
       rigs.back().link.inertia *= 1 + 0.1 * double(count);
       rigs.back().link.coulomb_friction *= double(count - 1);
+      rigs.back().output_coupling.stiffness *= double(count);
       first_loads.push_back(motion.first_load + 1e-4 * double(count));
       const std::vector<DrivenLoad> all = simulate_driven_loads(rigs, first_loads, motion, 50);
       ASSERT_EQ(all.size(), count > 1 ? count : 0);
       for (std::size_t i = 0; i < all.size(); ++i) {
         RecordedMotion own = motion;
         own.first_load = first_loads[i];
-        EXPECT_TRUE(same_motion(all[i], simulate_driven_load(rigs[i], own, 50))) << law << " " << i;
+        EXPECT_TRUE(same_motion(all[i], simulate_driven_load(rigs[i], own, 50))) << rig.name << " " << i;
       }
     }
   }
@@ -303,11 +308,13 @@ TEST(DrivenLoad, SeveralAtOnceMoveAsEachAlone) {
 TEST(DrivenLoad, OthersDoNotMoveAtOnce) {
   const model::Rig rig = other_servo();
   const record::Record record = simulate_record(rig, test::servo_run(3, false), 0.1);
-  model::Rig with_term = rig, other_law = rig;
+  model::Rig with_term = rig, other_law = rig, behind_shaft = rig;
+  behind_shaft.output_coupling = test::servo_behind_shaft(0.01).output_coupling;
+  behind_shaft.bearing_at_gear = true;
   with_term.terms.push_back(std::make_shared<Nothing>());
   other_law.mesh.contact =
       model::make_contact_law("hunt_crossley", {{"stiffness", 4e6}, {"exponent", 1.5}, {"alpha", 0.4}});
-  for (const model::Rig& other : {with_term, other_law})
+  for (const model::Rig& other : {with_term, other_law, behind_shaft})
     EXPECT_TRUE(simulate_driven_loads({rig, other}, {0, 0}, motion_of(record), 50).empty());
 }
 

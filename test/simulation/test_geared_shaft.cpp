@@ -4,13 +4,15 @@
 
 #include <cmath>
 
+#include "../../src/simulation/lanes.h"
+// Beyond the lanes.
 #include "../../src/simulation/geared_shaft.h"
 
 namespace backlash::simulation {
 namespace {
 
 constexpr double kTeeth = 4e4, kShaft = 9e4, kHalfGap = 5e-4, kFriction = 1.5;  // N m/rad, rad, N m
-constexpr GearedShaft kOnShaft{kShaft};
+constexpr GearedShaft<double> kOnShaft{kShaft};
 
 /// N m, with the motor there and the gear here.
 double through_teeth(double motor, double gear) {
@@ -18,14 +20,13 @@ double through_teeth(double motor, double gear) {
   return deep > 0 ? std::copysign(kTeeth * deep, twist) : 0;
 }
 
-Gear moved(const Gear& before, double guess, double motor, double link) {
-  model::GearTrain::LoadForces forces{0, 0, 0, {kFriction, kFriction}};
-  const auto at = [&](double gear) -> const model::GearTrain::LoadForces& {
-    forces.mesh_torque = through_teeth(motor, gear);
-    return forces;
-  };
-  const Gear gear = kOnShaft.follow(before, guess, link, at);
-  EXPECT_EQ(forces.mesh_torque, through_teeth(motor, gear.position)) << "was asked last elsewhere";
+Gear<double> moved(const Gear<double>& before, double motor, double link) {
+  double asked = 0;
+  const Gear<double> gear = kOnShaft.follow(before, link, [&](double at) {
+    asked = at;
+    return OnGear<double>{through_teeth(motor, at), kFriction, kFriction};
+  });
+  EXPECT_EQ(asked, gear.position) << "was asked last elsewhere";
   return gear;
 }
 
@@ -35,7 +36,7 @@ double rubs(double motor, double gear, double link) {
 }
 
 TEST(GearedShaft, StandsWhileTheBearingHoldsIt) {
-  const Gear gear = moved({}, 1e-5, kHalfGap + 0.9 * kFriction / kTeeth, 0);
+  const Gear<double> gear = moved({}, kHalfGap + 0.9 * kFriction / kTeeth, 0);
   EXPECT_EQ(gear.position, 0);
   EXPECT_EQ(gear.slides, 0);
 }
@@ -43,7 +44,7 @@ TEST(GearedShaft, StandsWhileTheBearingHoldsIt) {
 TEST(GearedShaft, PressedItGoesWhereFrictionIsAtItsLimit) {
   for (const double way : {1.0, -1.0}) {
     const double motor = way * 2e-3;
-    const Gear gear = moved({}, 0, motor, 0);
+    const Gear<double> gear = moved({}, motor, 0);
     // k_t (q_M - s / 2 - q) - k q = F
     EXPECT_NEAR(gear.position, way * (kTeeth * (2e-3 - kHalfGap) - kFriction) / (kTeeth + kShaft), 1e-9);
     EXPECT_EQ(gear.slides, way);
@@ -53,13 +54,13 @@ TEST(GearedShaft, PressedItGoesWhereFrictionIsAtItsLimit) {
 }
 
 TEST(GearedShaft, InTheGapTheLinkTakesItAlong) {
-  const Gear gear = moved({}, 0, 1e-4, 3e-4);
+  const Gear<double> gear = moved({}, 1e-4, 3e-4);
   EXPECT_NEAR(gear.position, 3e-4 - kFriction / kShaft, 1e-9);
   EXPECT_EQ(gear.slides, 1);
 }
 
 TEST(GearedShaft, ThroughTheWholeGapToTheOtherFlank) {
-  const Gear gear = moved({2e-3, 1, kTeeth + kShaft}, 2e-3, -2e-3, 0);
+  const Gear<double> gear = moved({2e-3, 1, kTeeth + kShaft}, -2e-3, 0);
   EXPECT_NEAR(gear.position, (kTeeth * (-2e-3 + kHalfGap) + kFriction) / (kTeeth + kShaft), 1e-9);
   EXPECT_EQ(gear.slides, -1);
 }
@@ -67,14 +68,14 @@ TEST(GearedShaft, ThroughTheWholeGapToTheOtherFlank) {
 // A play operator knows no rate: in many steps or in one it comes to the same place, and each reversal takes
 // 2 F of the torque before it moves.
 TEST(GearedShaft, ManyStepsAreAsOne) {
-  Gear gear;
-  for (int k = 1; k <= 1000; ++k) gear = moved(gear, gear.position, 3e-6 * k, 0);
-  EXPECT_NEAR(gear.position, moved({}, 0, 3e-3, 0).position, 1e-9);
+  Gear<double> gear;
+  for (int k = 1; k <= 1000; ++k) gear = moved(gear, 3e-6 * k, 0);
+  EXPECT_NEAR(gear.position, moved({}, 3e-3, 0).position, 1e-9);
   const double before = gear.position;
   const double holds = 2 * kFriction / kTeeth;  // rad of the motor
-  gear = moved(gear, before, 3e-3 - 0.99 * holds, 0);
+  gear = moved(gear, 3e-3 - 0.99 * holds, 0);
   EXPECT_EQ(gear.position, before);
-  gear = moved(gear, before, 3e-3 - 1.01 * holds, 0);
+  gear = moved(gear, 3e-3 - 1.01 * holds, 0);
   EXPECT_LT(gear.position, before);
 }
 

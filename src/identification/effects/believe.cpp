@@ -88,6 +88,13 @@ std::string other_in_a_part(const StrengthInParts& parts, std::size_t effect) {
                      part->part, part->ratio, part->standard_error);
 }
 
+const std::string kRunsAway = "with it the simulated load does not follow the unseen record";
+
+std::optional<ServoPrediction> followed(const Machine& machine, const ServoData& unseen,
+                                        const SearchContext& context) {
+  return attempted([&] { return predicted(machine, unseen, context.settings.fit); });
+}
+
 /// The first effect that is not to be believed, and why.
 std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis& h, const ServoData& unseen,
                                                                 const SearchContext& context) {
@@ -97,11 +104,16 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (!belongs_to_machine(i) && is_vague(all[i], settings.least_z))
       return std::pair{i, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};
+  std::vector<ServoPrediction> on_unseen = {predicted(h.base->fit.machine, unseen, context.settings.fit)};
+  for (std::size_t i = 0; i < h.effects.size(); ++i) {
+    auto with = followed(*h.effects[i].after, unseen, context);
+    if (!with) return std::pair{i, kRunsAway};
+    on_unseen.push_back(std::move(*with));
+  }
   const StrengthInParts parts(h, unseen, context);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (std::string why = other_in_a_part(parts, i); !belongs_to_machine(i) && !why.empty())
       return std::pair{i, std::move(why)};
-  const std::vector<ServoPrediction> on_unseen = predicted_by_all(h, unseen, context.settings.fit);
   for (std::size_t i = 0; i < h.effects.size(); ++i) {
     const Effect& effect = h.effects[i];
     std::string why = contradicted(on_unseen[i], on_unseen[i + 1], effect.gain.deflection,
@@ -122,8 +134,10 @@ std::string contradicted_by_unseen(const Hypothesis& h, const SearchContext& con
   const Effect& last = h.effects.back();
   if (is_usual(last.candidate, h)) return "";
   const Machine& before = h.effects.size() > 1 ? *h.effects.end()[-2].after : h.base->fit.machine;
-  return contradicted(predicted(before, context.unseen, fit), predicted(*last.after, context.unseen, fit),
-                      last.gain.deflection, is_learned(last.candidate.id), context.settings.belief);
+  const auto with = followed(*last.after, context.unseen, context);
+  if (!with) return kRunsAway;
+  return contradicted(predicted(before, context.unseen, fit), *with, last.gain.deflection,
+                      is_learned(last.candidate.id), context.settings.belief);
 }
 
 Hypothesis believe(const Hypothesis& before, const ServoData& unseen, const SearchContext& context) {

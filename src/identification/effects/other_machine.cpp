@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "contact_shape.h"
 #include "effect_roles.h"
+#include "orthogonal_part.h"
 #include "steps.h"
 #include "unseen_record.h"
 
@@ -56,6 +57,24 @@ std::optional<Hypothesis> fitted_with(const model::Rig& rig, const std::vector<E
   }
   context.report_hypothesis(other);
   return other;
+}
+
+/// Whether another machine is worth a fit beside this one: by what it changes beside the fitted values, as of
+/// a candidate (Candidate::gain).
+bool promises(const model::Rig& other, const Hypothesis& h, const SearchContext& context) {
+  const MachineFit& fit = h.fitted->fit;
+  const auto gain = attempted([&] {
+    const auto rows = [&](const model::Rig& rig) {
+      return h.fitted->records.rows(rig, fit.machine.calibrations);
+    };
+    const Eigen::VectorXd now = rows(fit.machine.rig);
+    const OrthogonalPart orthogonal(fit, now.size());
+    const Eigen::VectorXd column = orthogonal.of(rows(other) - now), &left = orthogonal.residuals();
+    const double along = std::max(0.0, -column.dot(left)) / (column.norm() * left.norm());
+    return 1 - std::sqrt(1 - along * along);
+  });
+  const SearchSettings& settings = context.settings;
+  return gain && *gain >= settings.trials.least_predicted * (1 - settings.revision.clearly_less);
 }
 
 /// With the law that leaves least.
@@ -118,12 +137,14 @@ double left_unseen(const Hypothesis& h, const SearchContext& context) {
 
 std::optional<Hypothesis> with_shaft(const Hypothesis& h, const SearchContext& context) {
   if (clearly_right(misfit(h), context)) return std::nullopt;
-  const auto rig = before_shaft(h.base->fit.machine.rig, context.range.torque);
-  if (!rig) return std::nullopt;
+  const auto rig = before_shaft(h.base->fit.machine.rig, context.range.torque),
+             beside = before_shaft(h.fitted->fit.machine.rig, context.range.torque);
+  if (!rig || !beside || !promises(*beside, h, context)) return std::nullopt;
   auto other = attempted([&] { return fitted_with(*rig, h.effects, h, context); });
   if (!other || !*other || size(**other) >= context.settings.revision.clearly_less * size(h))
     return std::nullopt;
-  if (left_unseen(**other, context) >= left_unseen(h, context)) return std::nullopt;
+  const auto unseen = attempted([&] { return left_unseen(**other, context); });
+  if (!unseen || *unseen >= left_unseen(h, context)) return std::nullopt;
   (*other)->behind_shaft = true;
   return *other;
 }
@@ -132,6 +153,9 @@ std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchCont
   const std::vector<Effect> others = without_stand_ins_for_teeth(h.effects);
   const bool harden = others.size() < h.effects.size();
   if (!harden && clearly_right(misfit(h), context)) return std::nullopt;
+  const auto beside = with_hertzian_teeth(h.fitted->fit.machine.rig, context.range.torque);
+  const auto promising = [&](const model::Rig& teeth) { return promises(teeth, h, context); };
+  if (!harden && std::none_of(beside.begin(), beside.end(), promising)) return std::nullopt;
   // Of the machine without hardening, which has a stiffness of its own.
   const auto laws = with_hertzian_teeth(h.base->fit.machine.rig, context.range.torque);
   if (laws.empty()) return std::nullopt;
@@ -151,7 +175,9 @@ std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchCont
 }
 
 std::optional<Hypothesis> with_other_machine(const Hypothesis& h, const SearchContext& context) {
-  auto teeth = with_other_teeth(h, context), shaft = with_shaft(h, context);
+  auto shaft = with_shaft(h, context);
+  if (shaft && clearly_right(misfit(*shaft), context)) return shaft;
+  auto teeth = with_other_teeth(h, context);
   return shaft && (!teeth || size(*shaft) < size(*teeth)) ? shaft : teeth;
 }
 

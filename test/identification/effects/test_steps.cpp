@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/simulation/simulation.h"
 #include "identification/effects/contact_shape.h"
 #include "identification/effects/found_effects.h"
 #include "identification/effects/learned.h"
@@ -207,6 +208,29 @@ TEST(OtherTeeth, AreNotTriedOfOneInertiaWhichHasNone) {
 /// A torque over the position that no named effect has: a step that is rounded a little.
 double unnamed(double q) {
   return 1.5 * std::tanh(8 * (q - 0.2)) * (q > -0.5 ? 1 : -0.6);
+}
+
+/// Of a record of this machine, whose rig file has bearing and encoder on the load.
+std::optional<Hypothesis> shaft_of(const model::Rig& machine) {
+  const model::Rig declared = test::servo_file().rig;
+  const SearchBench bench(declared, {simulation::simulate_record(machine, test::servo_run(11), 4)});
+  return with_shaft(fit_declared(declared, bench.context), bench.context);
+}
+
+TEST(WithShaft, BearingAndEncoderAreBeforeIt) {
+  const auto h = shaft_of(test::servo_behind_shaft(0.01));
+  ASSERT_TRUE(h);
+  EXPECT_TRUE(h->behind_shaft);
+  EXPECT_TRUE(h->effects.empty());
+  // The fit's gear has no mass: a tenth.
+  EXPECT_NEAR(h->fitted->fit.machine.rig.output_coupling.stiffness, 1.2e6, 0.12e6);
+}
+
+TEST(WithShaft, AGapThatVariesIsNone) {
+  model::Rig machine = test::other_servo();
+  machine.terms.push_back(
+      model::make_term("varying_backlash", {{"amplitude", 0.3}, {"order", 7}, {"phase", 0.4}}));
+  EXPECT_FALSE(shaft_of(machine));
 }
 
 TEST(Learned, MapsAreOverTheCoordinateThatTheResidualFollows) {
