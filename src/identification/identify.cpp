@@ -186,10 +186,11 @@ void warn_of_misfit(Identification& result) {
 
 void require_served(const model::Rig& rig) {
   if (rig.input_coupling.rigid && rig.link_locked) return require_locked_output(rig);
-  if (!model::has_two_inertias(rig))
+  if (!model::has_two_inertias(rig) && !(rig.bearing_at_gear && rig.input_coupling.rigid))
     throw CannotIdentify(
         std::string(
-            "identify knows one inertia (mesh: rigid), two (rigid couplings, free link), a locked "
+            "identify knows one inertia (mesh: rigid), two (rigid couplings, free link; the output coupling "
+            "may be elastic with the bearing at the gear), a locked "
             "output (rigid input coupling), and a torque sensor (elastic input coupling; mesh linear, "
             "a power law or Hunt-Crossley; damping > 0 of motor and couplings; no terms); this rig has ") +
         (rig.input_coupling.rigid ? "a rigid" : "an elastic") + " input coupling, " +

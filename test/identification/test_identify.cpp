@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fitted_rig.h"
 #include "backlash_diagnosis/identification/identify.h"
+#include "identification/procedures/procedures.h"
 #include "support/servo.h"
 
 namespace backlash::identification {
@@ -58,6 +59,34 @@ TEST(Identify, ErrorsHoldWhatHertzianTeethWouldBeEstimatedAs) {
       return warning.find("Hertzian teeth leave less") != std::string::npos;
     })) << gap;
   }
+}
+
+TEST(Identify, TakesALoadBehindAShaft) {
+  const model::Rig rig = test::servo_behind_shaft(0.01);
+  record::Record record = simulation::simulate_record(rig, test::servo_run(1), 2.5);
+  EXPECT_EQ(identification_case(rig, {record}).names.size(), 11u);  // with output_stiffness
+  model::Rig bearing_at_link = rig;
+  bearing_at_link.bearing_at_gear = false;
+  EXPECT_THROW(identification_case(bearing_at_link, {record}), CannotIdentify);
+}
+
+// With the shaft in the rig file, whose stiffness, play and inertia are 20 % off there.
+TEST(Identify, ALoadBehindAShaft) {
+  const model::Rig truth = test::servo_behind_shaft(0.01);
+  record::Record record = simulation::simulate_record(truth, test::servo_run(1), 6);
+  record.name = "shaft.csv";
+  model::Rig declared = truth;
+  declared.output_coupling.stiffness *= 1.2;
+  declared.mesh.backlash *= 1.2;
+  declared.link.inertia *= 0.8;
+  const Identification found = identify(declared, {record});
+  // The fit's gear has no mass: a tenth of the stiffnesses and inertias. The play is where it turns.
+  for (const auto& [name, value] :
+       {std::pair{"output_stiffness", 1.2e6}, {"mesh_stiffness", 400e3}, {"load_inertia", 84.0}})
+    EXPECT_NEAR(found.parameters.at(name).value, value, 0.1 * value) << name;
+  const signal::Measured play = found.parameters.at("backlash_angle");
+  EXPECT_NEAR(play.value, truth.mesh.backlash, 3 * play.standard_error);
+  EXPECT_LT(play.standard_error, 0.02 * truth.mesh.backlash);
 }
 
 TEST(Identify, ARecordOfTheMotorSideAloneShowsItsFriction) {
