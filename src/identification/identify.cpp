@@ -189,10 +189,10 @@ void require_served(const model::Rig& rig) {
   if (!model::has_two_inertias(rig) && !(rig.bearing_at_gear && rig.input_coupling.rigid))
     throw CannotIdentify(
         std::string(
-            "identify knows one inertia (mesh: rigid), two (rigid couplings, free link; the output coupling "
-            "may be elastic with the bearing at the gear), a locked "
-            "output (rigid input coupling), and a torque sensor (elastic input coupling; mesh linear, "
-            "a power law or Hunt-Crossley; damping > 0 of motor and couplings; no terms); this rig has ") +
+            "identify knows one inertia (mesh: rigid), two (rigid couplings or a bearing at the gear, free "
+            "link), a locked output (rigid input coupling), and a torque sensor (elastic input coupling; "
+            "mesh "
+            "linear, power law or Hunt-Crossley; damped; no terms); this rig has ") +
         (rig.input_coupling.rigid ? "a rigid" : "an elastic") + " input coupling, " +
         (rig.output_coupling.rigid ? "a rigid" : "an elastic") + " output coupling and a " +
         (rig.link_locked ? "locked" : "free") + " link");
