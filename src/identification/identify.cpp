@@ -72,11 +72,12 @@ std::vector<std::string> parameter_names(const model::Rig& rig) {
   return names;
 }
 
-/// All but the first and the last assume that the torque is this joint's alone.
+/// All but the first and the last assume that the torque is this joint's alone, and that it has two bodies.
 std::vector<Procedure> procedures_for(const model::Rig& rig) {
   if (rig.mesh.rigid) return {{"one_inertia", run_one_inertia}};
   if (rig.link_locked) return {{"locked_output", run_locked_output}};
-  if (rig.coupled) return {servo_procedures().front(), servo_procedures().back()};
+  if (rig.coupled || !rig.output_coupling.rigid)
+    return {servo_procedures().front(), servo_procedures().back()};
   return servo_procedures();
 }
 
@@ -191,8 +192,7 @@ void require_served(const model::Rig& rig) {
         std::string(
             "identify knows one inertia (mesh: rigid), two (rigid couplings or a bearing at the gear, free "
             "link), a locked output (rigid input coupling), and a torque sensor (elastic input coupling; "
-            "mesh "
-            "linear, power law or Hunt-Crossley; damped; no terms); this rig has ") +
+            "mesh linear, power law or Hunt-Crossley; damped; no terms); this rig has ") +
         (rig.input_coupling.rigid ? "a rigid" : "an elastic") + " input coupling, " +
         (rig.output_coupling.rigid ? "a rigid" : "an elastic") + " output coupling and a " +
         (rig.link_locked ? "locked" : "free") + " link");

@@ -26,7 +26,7 @@ struct alignas(sizeof(Real)) OnGear {
 
 template <typename Real>
 struct alignas(sizeof(Real)) GearedShaft {
-  Real stiffness = {};  // N m/rad, of the shaft; 0: there is none, the gear is the load
+  Real stiffness = {};  // N m/rad, of the shaft
 
   /// rad/s, of the gear as its balance changes; `mesh_torque` at that moment.
   BACKLASH_LANES Real rate(const Gear<Real>& gear, const Real& mesh_torque, const Real& motor_rate,

@@ -66,6 +66,7 @@ BACKLASH_LANES Lanes any_power(const Lanes& a, double exponent) {
   return r;
 }
 
+/// Of one lane or more.
 template <typename Real>
 BACKLASH_LANES bool any_positive(const Real& a) {
   bool any = false;

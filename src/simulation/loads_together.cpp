@@ -50,7 +50,7 @@ class alignas(sizeof(Real)) LoadsTogether {
 
   Real q = {}, w = {};  // of each, now
   const Real& mesh_torque() const { return now_.mesh_torque; }
-  Real shown() const { return behind_shaft_ ? now_.gear.position : q; }
+  BACKLASH_LANES Real shown() const { return behind_shaft_ ? now_.gear.position : q; }
 
  private:
   static constexpr int kCount = kLanesOf<Real>;

@@ -80,6 +80,7 @@ TEST(Identify, ALoadBehindAShaft) {
   declared.mesh.backlash *= 1.2;
   declared.link.inertia *= 0.8;
   const Identification found = identify(declared, {record});
+  EXPECT_EQ(found.procedures.size(), 2u);  // none that knows two bodies only
   // The fit's gear has no mass: a tenth of the stiffnesses and inertias. The play is where it turns.
   for (const auto& [name, value] :
        {std::pair{"output_stiffness", 1.2e6}, {"mesh_stiffness", 400e3}, {"load_inertia", 84.0}})

@@ -114,6 +114,14 @@ Explained explain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& left) {
   return e;
 }
 
+/// What the fitted parameters do not explain of a change; 0 where that is next to nothing.
+Eigen::VectorXd own_part(const Eigen::VectorXd& change, const OrthogonalPart& orthogonal,
+                         const ScreenSettings& settings) {
+  Eigen::VectorXd left = orthogonal.of(change);
+  if (left.norm() < settings.least_own * change.norm() || change.norm() == 0) left.setZero();
+  return left;
+}
+
 /// Strength and phase from the factors of one term's probes; false where the strength cannot be negative.
 bool set_strength(const Probed& p, const double* factors, ParameterValues& values) {
   const model::TermSearch& search = *p.type->search;
@@ -200,6 +208,16 @@ model::MotionRange motion_range(const std::vector<ServoData>& records) {
   return range;
 }
 
+double predicted_gain(const model::Rig& other, const MachineFit& fit, const RecordSet& records,
+                      const ScreenSettings& settings) {
+  const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
+  const OrthogonalPart orthogonal(fit, now.size());
+  const Explained e =
+      explain(own_part(records.rows(other, fit.machine.calibrations) - now, orthogonal, settings),
+              orthogonal.residuals());
+  return e.factors[0] > 0 ? e.gain : 0;
+}
+
 std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
                               const model::MotionRange& range, const ScreenSettings& settings) {
   const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
@@ -207,10 +225,7 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
   const auto column = [&](const model::Term& term) {
     model::Rig rig = fit.machine.rig;
     rig.terms.push_back(model::make_term(term.id, term.values));
-    const Eigen::VectorXd change = records.rows(rig, fit.machine.calibrations) - now;
-    Eigen::VectorXd left = orthogonal.of(change);
-    if (left.norm() < settings.least_own * change.norm() || change.norm() == 0) left.setZero();
-    return left;
+    return own_part(records.rows(rig, fit.machine.calibrations) - now, orthogonal, settings);
   };
   return screen(fit.machine.rig, orders_of_fit(fit, records, orthogonal), range, settings,
                 orthogonal.residuals(), column);

@@ -37,6 +37,10 @@ std::size_t shape_count(const Candidate& candidate);
 std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
                               const model::MotionRange& range, const ScreenSettings& settings);
 
+/// The same of another rig at the values of the fit, if the change to it may be of any size.
+double predicted_gain(const model::Rig& other, const MachineFit& fit, const RecordSet& records,
+                      const ScreenSettings& settings);
+
 /// The change of the residuals by a term, less the part that the fitted parameters explain.
 using ColumnOf = std::function<Eigen::VectorXd(const model::Term&)>;
 /// The same of other residuals, `left`, with their own sensitivities.

@@ -7,7 +7,6 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "contact_shape.h"
 #include "effect_roles.h"
-#include "orthogonal_part.h"
 #include "steps.h"
 #include "unseen_record.h"
 
@@ -59,21 +58,11 @@ std::optional<Hypothesis> fitted_with(const model::Rig& rig, const std::vector<E
   return other;
 }
 
-/// Whether another machine is worth a fit beside this one: by what it changes beside the fitted values, as of
-/// a candidate (Candidate::gain).
+/// Whether another machine is worth a fit beside this one.
 bool promises(const model::Rig& other, const Hypothesis& h, const SearchContext& context) {
-  const MachineFit& fit = h.fitted->fit;
-  const auto gain = attempted([&] {
-    const auto rows = [&](const model::Rig& rig) {
-      return h.fitted->records.rows(rig, fit.machine.calibrations);
-    };
-    const Eigen::VectorXd now = rows(fit.machine.rig);
-    const OrthogonalPart orthogonal(fit, now.size());
-    const Eigen::VectorXd column = orthogonal.of(rows(other) - now), &left = orthogonal.residuals();
-    const double along = std::max(0.0, -column.dot(left)) / (column.norm() * left.norm());
-    return 1 - std::sqrt(1 - along * along);
-  });
   const SearchSettings& settings = context.settings;
+  const auto gain =
+      attempted([&] { return predicted_gain(other, h.fitted->fit, h.fitted->records, settings.screen); });
   return gain && *gain >= settings.trials.least_predicted * (1 - settings.revision.clearly_less);
 }
 
@@ -139,7 +128,7 @@ std::optional<Hypothesis> with_shaft(const Hypothesis& h, const SearchContext& c
   if (clearly_right(misfit(h), context)) return std::nullopt;
   const auto rig = before_shaft(h.base->fit.machine.rig, context.range.torque),
              beside = before_shaft(h.fitted->fit.machine.rig, context.range.torque);
-  if (!rig || !beside || !promises(*beside, h, context)) return std::nullopt;
+  if (!beside || !promises(*beside, h, context)) return std::nullopt;
   auto other = attempted([&] { return fitted_with(*rig, h.effects, h, context); });
   if (!other || !*other || size(**other) >= context.settings.revision.clearly_less * size(h))
     return std::nullopt;

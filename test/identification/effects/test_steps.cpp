@@ -210,15 +210,17 @@ double unnamed(double q) {
   return 1.5 * std::tanh(8 * (q - 0.2)) * (q > -0.5 ? 1 : -0.6);
 }
 
-/// Of a record of this machine, whose rig file has bearing and encoder on the load.
-std::optional<Hypothesis> shaft_of(const model::Rig& machine) {
-  const model::Rig declared = test::servo_file().rig;
-  const SearchBench bench(declared, {simulation::simulate_record(machine, test::servo_run(11), 4)});
-  return with_shaft(fit_declared(declared, bench.context), bench.context);
-}
+/// A record of this machine, whose rig file has bearing and encoder on the load.
+struct ServoBench : SearchBench {
+  explicit ServoBench(const model::Rig& machine)
+      : SearchBench(test::servo_file().rig, {simulation::simulate_record(machine, test::servo_run(11), 4)}),
+        fitted(fit_declared(test::servo_file().rig, context)) {}
+  Hypothesis fitted;
+};
 
 TEST(WithShaft, BearingAndEncoderAreBeforeIt) {
-  const auto h = shaft_of(test::servo_behind_shaft(0.01));
+  const ServoBench bench(test::servo_behind_shaft(0.01));
+  const auto h = with_shaft(bench.fitted, bench.context);
   ASSERT_TRUE(h);
   EXPECT_TRUE(h->behind_shaft);
   EXPECT_TRUE(h->effects.empty());
@@ -226,11 +228,28 @@ TEST(WithShaft, BearingAndEncoderAreBeforeIt) {
   EXPECT_NEAR(h->fitted->fit.machine.rig.output_coupling.stiffness, 1.2e6, 0.12e6);
 }
 
+// Much is left, and the sensitivities show that a shaft would not take it: none is fitted.
 TEST(WithShaft, AGapThatVariesIsNone) {
   model::Rig machine = test::other_servo();
   machine.terms.push_back(
       model::make_term("varying_backlash", {{"amplitude", 0.3}, {"order", 7}, {"phase", 0.4}}));
-  EXPECT_FALSE(shaft_of(machine));
+  ServoBench bench(machine);
+  EXPECT_GT(misfit(bench.fitted).deflection, 3);
+  int fits = 0;
+  bench.context.report = [&](const std::string&) { ++fits; };
+  EXPECT_FALSE(with_shaft(bench.fitted, bench.context));
+  EXPECT_EQ(fits, 0);
+}
+
+// Its load gains speed by itself.
+TEST(Believe, AMachineThatRunsAwayIsContradicted) {
+  const ServoBench bench(test::other_servo());
+  Machine unstable = bench.fitted.fitted->fit.machine;
+  unstable.rig.link.viscous_damping = -1e5;
+  Hypothesis h = bench.fitted;
+  h.effects.push_back(drag_effect(1));
+  h.effects.back().after = std::make_shared<const Machine>(unstable);
+  EXPECT_NE(contradicted_by_unseen(h, bench.context).find("does not follow"), std::string::npos);
 }
 
 TEST(Learned, MapsAreOverTheCoordinateThatTheResidualFollows) {
