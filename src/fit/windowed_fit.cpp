@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "backlash_diagnosis/base/parallel.h"
@@ -22,6 +23,7 @@ using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 // Of one window alone, which ends where a step gains less than this share of its cost.
 constexpr int kSettleSteps = 15;
 constexpr double kSettled = 1e-3;
+constexpr double kPaced = 10;  // steps at the pace of one, within which a cost that is wanted must be; choice
 
 }  // namespace
 
@@ -63,6 +65,20 @@ struct Evaluation : ceres::EvaluationCallback {
   }
 };
 
+/// Ends a solution that would not come to what is wanted.
+class Pace : public ceres::IterationCallback {
+ public:
+  explicit Pace(const FitOptions& options) : options_(options) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
+    const bool slow = step.iteration > 0 && step.step_is_successful &&
+                      2 * kPaced * step.cost_change < 2 * step.cost - options_.wanted;
+    return slow ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const FitOptions& options_;
+};
+
 /// Of one window with the shared values as they are.
 class OwnCost : public ceres::CostFunction {
  public:
@@ -87,26 +103,32 @@ class OwnCost : public ceres::CostFunction {
   int window_;
 };
 
+/// Of one channel of a window.
 class WindowCost : public ceres::CostFunction {
  public:
-  WindowCost(const WindowedFit& fit, int window) : part_(fit.parts_[std::size_t(window)]) {
-    set_num_residuals(int(part_.residual.size()));
+  WindowCost(const WindowedFit& fit, int window, int channel)
+      : part_(fit.parts_[std::size_t(window)]),
+        rows_(part_.residual.size() / fit.windows_->channels()),
+        first_(channel * rows_) {
+    set_num_residuals(int(rows_));
     *mutable_parameter_block_sizes() = {int(fit.shared.size()), int(fit.own[std::size_t(window)].size())};
   }
   bool Evaluate(const double* const*, double* residuals, double** slopes) const override {
     if (!part_.residual.allFinite()) return false;
-    Eigen::Map<VectorXd>(residuals, num_residuals()) = part_.residual;
-    const Eigen::Index own = parameter_block_sizes()[1];
-    if (slopes != nullptr && slopes[0] != nullptr)
-      Eigen::Map<RowMatrix>(slopes[0], num_residuals(), parameter_block_sizes()[0]) =
-          part_.slopes.leftCols(part_.slopes.cols() - own);
-    if (slopes != nullptr && slopes[1] != nullptr)
-      Eigen::Map<RowMatrix>(slopes[1], num_residuals(), own) = part_.slopes.rightCols(own);
+    Eigen::Map<VectorXd>(residuals, rows_) = part_.residual.segment(first_, rows_);
+    Eigen::Index from = 0;
+    for (std::size_t b = 0; b < parameter_block_sizes().size(); ++b) {
+      const Eigen::Index size = parameter_block_sizes()[b];
+      if (slopes != nullptr && slopes[b] != nullptr)
+        Eigen::Map<RowMatrix>(slopes[b], rows_, size) = part_.slopes.block(first_, from, rows_, size);
+      from += size;
+    }
     return true;
   }
 
  private:
   const WindowedFit::Part& part_;
+  const Eigen::Index rows_, first_;
 };
 
 WindowedFit::WindowedFit(const Windows& windows)
@@ -198,8 +220,11 @@ void WindowedFit::run(const FitOptions& options) {
     if (block < 0) {
       shared_values = at;
     } else {
-      const double scale = std::sqrt(robust_ * double(parts_[std::size_t(block)].residual.size()));
-      problem.AddResidualBlock(new WindowCost(*this, block), new ceres::CauchyLoss(scale), shared_values, at);
+      for (int c = 0; c < windows_->channels(); ++c) {
+        auto* cost = new WindowCost(*this, block, c);
+        problem.AddResidualBlock(cost, new ceres::CauchyLoss(std::sqrt(robust_ * cost->num_residuals())),
+                                 shared_values, at);
+      }
     }
     ++block;
   });
@@ -211,6 +236,8 @@ void WindowedFit::run(const FitOptions& options) {
   solver.function_tolerance = options.tolerance;
   solver.num_threads = 1;
   solver.logging_type = ceres::SILENT;
+  Pace pace(options);
+  solver.callbacks.push_back(&pace);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   evaluation.take();
@@ -223,32 +250,53 @@ void WindowedFit::run(const FitOptions& options) {
   central_ = false;
 }
 
-double WindowedFit::weight(int window) const {
+double WindowedFit::cost_at(const VectorXd& others, const FitOptions& options) const {
+  std::vector<double> costs(own.size(), 0.0);
+  for_each_in_parallel(windows_->count(), [&](int w) {
+    const VectorXd& mine = own[std::size_t(w)];
+    const VectorXd r = windows_->residuals(w, others, mine);
+    const Eigen::Index rows = r.size() / windows_->channels();
+    const double scale = options.robust * double(rows);
+    double& cost = costs[std::size_t(w)];
+    cost = mine.squaredNorm();
+    for (int c = 0; c < windows_->channels(); ++c)
+      cost += scale * std::log1p(r.segment(c * rows, rows).squaredNorm() / scale);
+  });
+  return std::accumulate(costs.begin(), costs.end(), others.squaredNorm());
+}
+
+double WindowedFit::weight(int window, int channel) const {
   const VectorXd& r = parts_[std::size_t(window)].residual;
-  return 1 / (1 + r.squaredNorm() / (robust_ * double(r.size())));
+  const Eigen::Index rows = r.size() / windows_->channels();
+  return 1 / (1 + r.segment(channel * rows, rows).squaredNorm() / (robust_ * double(rows)));
 }
 
 double WindowedFit::mean_square() const {
   double squares = 0, rows = 0;
-  for (int w = 0; w < windows_->count(); ++w) {
-    const VectorXd& r = parts_[std::size_t(w)].residual;
-    squares += weight(w) * r.squaredNorm(), rows += weight(w) * double(r.size());
-  }
+  for (int w = 0; w < windows_->count(); ++w)
+    for (int c = 0; c < windows_->channels(); ++c) {
+      const VectorXd& r = parts_[std::size_t(w)].residual;
+      const Eigen::Index n = r.size() / windows_->channels();
+      squares += weight(w, c) * r.segment(c * n, n).squaredNorm(), rows += weight(w, c) * double(n);
+    }
   return squares / rows;
 }
 
 /// Adds what a window says of the shared values, its own eliminated.
 void WindowedFit::reduce(int window, MatrixXd* information, VectorXd* score) const {
   const Part& part = parts_[std::size_t(window)];
-  const Eigen::Index n = shared.size(), m = part.slopes.cols() - n;
+  const Eigen::Index n = shared.size(), m = part.slopes.cols() - n,
+                     rows = part.residual.size() / windows_->channels();
+  VectorXd f(part.residual.size());
+  for (int c = 0; c < windows_->channels(); ++c) f.segment(c * rows, rows).setConstant(weight(window, c));
   const auto s = part.slopes.leftCols(n), o = part.slopes.rightCols(m);
-  const double f = weight(window);
-  const MatrixXd owns = f * (o.transpose() * o) + MatrixXd::Identity(m, m), mixed = f * (o.transpose() * s);
+  const MatrixXd fs = f.asDiagonal() * s, fo = f.asDiagonal() * o;
+  const MatrixXd owns = o.transpose() * fo + MatrixXd::Identity(m, m), mixed = o.transpose() * fs;
   const Eigen::LDLT<MatrixXd> solver(owns);
-  *information += f * (s.transpose() * s) - mixed.transpose() * solver.solve(mixed);
-  *score = f * (s.transpose() * part.residual) -
-           mixed.transpose() *
-               solver.solve(VectorXd(f * (o.transpose() * part.residual) + own[std::size_t(window)]));
+  *information += s.transpose() * fs - mixed.transpose() * solver.solve(mixed);
+  *score =
+      fs.transpose() * part.residual -
+      mixed.transpose() * solver.solve(VectorXd(fo.transpose() * part.residual + own[std::size_t(window)]));
 }
 
 MatrixXd WindowedFit::information() const {
@@ -256,6 +304,18 @@ MatrixXd WindowedFit::information() const {
   VectorXd score;
   for (int w = 0; w < windows_->count(); ++w) reduce(w, &information, &score);
   return information;
+}
+
+double WindowedFit::windows_that_count(Eigen::Index which) const {
+  double sum = 0, squares = 0;
+  for (int w = 0; w < windows_->count(); ++w) {
+    MatrixXd information = MatrixXd::Zero(shared.size(), shared.size());
+    VectorXd score;
+    reduce(w, &information, &score);
+    const double mine = information(which, which);
+    sum += mine, squares += mine * mine;
+  }
+  return squares > 0 ? sum * sum / squares : 0;
 }
 
 MatrixXd WindowedFit::covariance() const {

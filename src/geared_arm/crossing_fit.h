@@ -1,39 +1,67 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Plays and teeth that explain the torques of the motors about all turns of the load, by the method of Gauss,
-// Newton, Levenberg and Marquardt. Equations: geared_arm/traverse.h.
+// Plays and teeth that explain the torques of the motors about all turns of the load: fit/windowed_fit.h with
+// the arm of geared_arm/traverse.h.
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <vector>
 
+#include "backlash_diagnosis/fit/windowed_fit.h"
 #include "crossing_motion.h"
 
 namespace backlash::geared_arm {
+
+/// What an arm leaves of its motors' torques, whitened: of each joint the means over some samples.
+class CrossingWindows : public fit::Windows {
+ public:
+  /// `data` must outlive it.
+  explicit CrossingWindows(const CrossingData& data);
+
+  /// The gap of this joint is known.
+  void hold_gap(std::size_t joint, double gap);
+  /// How much the gaps that turns say differ, of gaps as large as these.
+  void vary_about(const CrossingMachine& machine);
+  int count() const override { return int(data_.windows.size()); }
+  const fit::Priors& shared() const override { return shared_; }
+  const fit::Priors& own() const override { return own_; }
+  int channels() const override { return int(data_.joints.size()); }
+  Eigen::MatrixXd residuals(int w, const Eigen::MatrixXd& shared, const Eigen::MatrixXd& own) const override;
+
+  CrossingMachine machine(const Eigen::VectorXd& shared) const;
+  /// Of one window, as mesh_torques() has them.
+  Eigen::VectorXd own_of(const Eigen::VectorXd& own) const;
+  const CrossingData& data() const { return data_; }
+
+ private:
+  using Factors = std::vector<std::vector<Eigen::MatrixXd>>;  // per window, per joint
+  Eigen::VectorXd residual(int w, const CrossingMachine& machine, const Eigen::MatrixXd& mesh) const;
+
+  const CrossingData& data_;
+  fit::Priors shared_, own_;
+  std::shared_ptr<const Factors> factors_;  // of the covariances of what is left, lower: as large as all else
+};
 
 class CrossingFit {
  public:
   explicit CrossingFit(const CrossingData& data);
 
-  /// Begins with gaps [rad] and with everything else as declared.
-  void begin(const std::vector<double>& gaps);
-  /// The gap of this joint stays as it is.
-  void hold_gap(std::size_t joint, bool held) { held_[joint] = held; }
-  void set_gap(std::size_t joint, double gap);
-  /// At most so many steps; ends where at the pace of a step all of them would not bring the cost down to
-  /// what is wanted.
+  /// The same with a gap of this joint that does not move.
+  CrossingFit held(std::size_t joint, double gap) const;
+  /// At most so many steps; ends where they would not come to a cost that is wanted.
   void run(int steps, double wanted = std::numeric_limits<double>::infinity());
-  /// Takes, joint by joint, the gap of `grid` that explains most, all else as it is.
-  void scan(const std::vector<double>& grid);
+  /// Takes, joint by joint, the gap that explains most of those that are to be tried about one, all else as
+  /// it is; what the turns have of their own is forgotten: it would hold on to the gap that it was fitted
+  /// with.
+  void scan(const std::function<std::vector<double>(double)>& gaps_about);
 
-  double gap(std::size_t joint) const { return machine_[joint][kCrossingGap]; }
-  const CrossingMachine& machine() const { return machine_; }
-  const Eigen::VectorXd& own(std::size_t window) const { return own_[window]; }
+  double gap(std::size_t joint) const { return machine()[joint][kCrossingGap]; }
+  CrossingMachine machine() const { return windows_->machine(fit_.shared); }
+  Eigen::VectorXd own(std::size_t window) const { return windows_->own_of(fit_.own[window]); }
   /// Minus twice the logarithm of the likelihood of the residuals and of the deviations from what is known.
-  double cost() const { return cost_; }
-  /// The same with another gap; only each window's own values are fitted anew.
-  double cost_with(std::size_t joint, double gap) const;
+  double cost() const { return fit_.cost(); }
   /// Root of the mean square of a joint's weighted residuals that most windows do not exceed: about 1 where
   /// the equations hold.
   double misfit(std::size_t joint) const;
@@ -45,44 +73,14 @@ class CrossingFit {
   std::vector<Errors> errors() const;  // per joint
 
  private:
-  struct Part {                        // of one window
-    Eigen::VectorXd residual, offset;  // offset: of half the gradient by the machine, see shaken()
-    Eigen::MatrixXd global, own;       // derivatives by the machine, by what is of this window alone
-  };
-  struct Reduced {                         // by one window of the machine, its own values taken out
-    Eigen::MatrixXd inverse, information;  // inverse: of the information on its own values
-    Eigen::VectorXd score;
-  };
-  static Reduced reduced(const Part& part, const Eigen::MatrixXd& known, const Eigen::VectorXd& own);
-  Eigen::VectorXd residual(std::size_t window, const CrossingMachine& machine,
-                           const Eigen::VectorXd& own) const;
-  Part part(std::size_t window) const;
-  std::vector<Part> parts() const;
-  void weigh(std::size_t window, Part& part) const;
-  double shaken(std::size_t window, std::size_t joint, const CrossingMachine& machine) const;
-  double cost_of(std::size_t window, const Eigen::VectorXd& residual, const CrossingMachine& machine) const;
-  double cost_of(const CrossingMachine& machine, const std::vector<Eigen::VectorXd>& own) const;
-  double cost_of(std::size_t window, const CrossingMachine& machine, const Eigen::VectorXd& own) const;
-  double prior_cost(const CrossingMachine& machine) const;
-  void add_priors(Eigen::MatrixXd& h, Eigen::VectorXd& g) const;
-  void hold_at_bounds(Eigen::MatrixXd& h, Eigen::VectorXd& g) const;
-  double centre(std::size_t joint, int value) const;
-  double spread(std::size_t joint, int value) const;
-  Eigen::VectorXd own_spread(const CrossingMachine& machine) const;
-  CrossingMachine moved(const Eigen::VectorXd& step) const;
-  bool take(const CrossingMachine& machine, const std::vector<Part>& parts,
-            const std::vector<Reduced>& normals);
-  void take_rotors();
-  void whiten();
+  void set_gap(std::size_t joint, double gap);
+  /// All else as it is.
+  double cost_with(std::size_t joint, double gap) const;
+  /// The same on other windows of the same record.
+  void take(const CrossingWindows& windows);
 
-  const CrossingData& data_;
-  CrossingMachine machine_;
-  std::vector<char> held_;
-  std::vector<Eigen::VectorXd> own_;                   // per window: as mesh_torques() has it
-  std::vector<std::vector<Eigen::MatrixXd>> factors_;  // of covariances, lower: per window, per joint
-  std::vector<std::vector<double>> shaken_;            // the same: squares that noise of the position leaves
-  std::shared_ptr<const std::vector<LinkMobilities>> mobilities_;  // per window, with the machine's rotors
-  double cost_ = 0, damping_ = 1e-3;
+  std::shared_ptr<const CrossingWindows> windows_;
+  fit::WindowedFit fit_;
 };
 
 }  // namespace backlash::geared_arm

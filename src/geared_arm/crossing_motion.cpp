@@ -20,8 +20,8 @@ class Teeth {
  public:
   Teeth(const TraverseJoint& joint, const std::array<double, kCrossingValues>& values, double wider)
       : half_gap_(std::fmax(0, values[kCrossingGap] + wider) / 2),
-        stiffness_(joint.stiffness * std::exp(values[kCrossingStiffness])),
-        damping_(joint.damping * std::exp(values[kCrossingDamping])),
+        stiffness_(joint.stiffness * values[kCrossingStiffness]),
+        damping_(joint.damping * values[kCrossingDamping]),
         power_(values[kCrossingPower]),
         level_(joint.level) {}
 
@@ -243,8 +243,7 @@ LinkMobilities link_mobilities(const CrossingData& data, const CrossingWindow& w
   LinkMobilities all;
   for (Eigen::MatrixXd links : window.inertia) {
     for (std::size_t j = 0; j < machine.size(); ++j)
-      links(Eigen::Index(j), Eigen::Index(j)) -=
-          data.joints[j].rotor * (std::exp(machine[j][kCrossingRotor]) - 1);
+      links(Eigen::Index(j), Eigen::Index(j)) -= data.joints[j].rotor * (machine[j][kCrossingRotor] - 1);
     all.push_back(signal::symmetric_inverse(links));
   }
   return all;

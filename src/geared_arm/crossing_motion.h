@@ -13,10 +13,10 @@ namespace backlash::geared_arm {
 /// What is fitted of each joint.
 enum CrossingValue {
   kCrossingGap,        // rad, >= 0
-  kCrossingStiffness,  // logarithm, over the declared one
+  kCrossingStiffness,  // over the declared one
   kCrossingDamping,    // the same
   kCrossingPower,      // of the torque of the teeth over the deflection: 1 a spring, 1.5 after Hertz
-  kCrossingRotor,      // logarithm, over the declared one; what the motor moves in all stays the same
+  kCrossingRotor,      // over the declared one; what the motor moves in all stays the same
   kCrossingCoulomb,    // N m, of the link
   kCrossingEarlier,    // samples: the torque of a sample holds that much before it
   kCrossingValues

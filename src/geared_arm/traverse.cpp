@@ -24,10 +24,11 @@ using record::Channel;
 
 constexpr double kSmallest = 3e-5, kLargest = 0.03;  // rad, of the gaps that are tried first; choice
 constexpr int kTried = 40;                           // of them, evenly in the logarithm
+constexpr double kFine = 1.02;                       // ratio of those that are tried then; choice
+constexpr int kNearby = 10;                          // of them to each side: to the next of the first; theory
 constexpr int kSteps = 30;                           // of a fit
 constexpr double kProfile = 1.5;                     // ratio of gaps that a profile looks at; choice
 constexpr int kProfileSteps = 6;                     // of its fits; choice
-constexpr double kRivalApart = 1.25;                 // ratio of gaps that are different answers; choice
 constexpr double kLeastSlow = 0.005;                 // of the largest load; choice
 constexpr double kCycleSamples = 8;                  // in a cycle of the teeth, at least; choice
 constexpr double kFelt = 4;                          // the same, of joints that move others; choice
@@ -37,6 +38,13 @@ std::vector<double> grid() {
   std::vector<double> gaps{0};
   for (int i = 0; i < kTried; ++i)
     gaps.push_back(kSmallest * std::pow(kLargest / kSmallest, double(i) / (kTried - 1)));
+  return gaps;
+}
+
+/// Touches that come a cycle of the teeth earlier or later explain a turn nearly as well: finer than that.
+std::vector<double> gaps_about(double gap) {
+  std::vector<double> gaps;
+  for (int i = -kNearby; i <= kNearby; ++i) gaps.push_back(gap * std::pow(kFine, i));
   return gaps;
 }
 
@@ -184,38 +192,16 @@ std::size_t turns_of(const CrossingData& data, std::size_t k) {
 
 /// How much worse the record is explained without the gap; looked for until that is less than `wanted`.
 double evidence_of(const CrossingFit& best, std::size_t k, double wanted) {
-  CrossingFit sound = best;
-  sound.set_gap(k, 0);
-  sound.hold_gap(k, true);
+  CrossingFit sound = best.held(k, 0);
   sound.run(kSteps, best.cost() + wanted);
   return sound.cost() - best.cost();
-}
-
-/// Another gap that explains the record about as well; NaN: none. Looked for from each gap that is better
-/// than its neighbours.
-double rival_of(const CrossingFit& best, std::size_t k, const TraverseSettings& settings) {
-  const auto apart = [&](double gap) {
-    return gap > kRivalApart * best.gap(k) || gap < best.gap(k) / kRivalApart;
-  };
-  const std::vector<double> gaps = grid();
-  std::vector<double> costs;
-  for (const double gap : gaps) costs.push_back(best.cost_with(k, gap));
-  for (std::size_t i = 1; i + 1 < gaps.size(); ++i) {
-    if (costs[i] > costs[i - 1] || costs[i] > costs[i + 1] || !apart(gaps[i])) continue;
-    CrossingFit other = best;
-    other.set_gap(k, gaps[i]);
-    other.run(kSteps, best.cost() + settings.rival);
-    if (apart(other.gap(k)) && other.cost() - best.cost() < settings.rival) return other.gap(k);
-  }
-  return std::nan("");
 }
 
 /// The largest gap that explains the record about as well as the best, `from` or more.
 double largest_of(const CrossingFit& best, std::size_t k, double from, const TraverseSettings& settings) {
   CrossingFit other = best;
-  other.hold_gap(k, true);
   for (double gap = from; gap < kLargest; gap *= kProfile) {
-    other.set_gap(k, gap);
+    other = other.held(k, gap);
     other.run(kProfileSteps);
     if (other.cost() - best.cost() > settings.rival) return gap;
   }
@@ -228,7 +214,7 @@ double largest_of(const CrossingFit& best, std::size_t k, double from, const Tra
 double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Errors& errors,
                   const Judged& judged) {
   const TraverseJoint& joint = judged.data.joints[k];
-  const double stiffness = joint.stiffness * std::exp(fit.machine()[k][kCrossingStiffness]);
+  const double stiffness = joint.stiffness * fit.machine()[k][kCrossingStiffness];
   const double error = std::fmax(errors.own * std::fmax(1, judged.misfit), errors.clustered);
   const double t = signal::student_t_quantile(0.975, std::fmax(1, errors.turns - 1));
   return std::hypot(t * error, judged.settings.model * fit.gap(k),
@@ -237,7 +223,7 @@ double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Erro
 
 /// By which factor the teeth are stiffer or softer than declared.
 double off_stiffness(const CrossingFit& fit, std::size_t k) {
-  return std::exp(std::fabs(fit.machine()[k][kCrossingStiffness]));
+  return std::exp(std::fabs(std::log(fit.machine()[k][kCrossingStiffness])));
 }
 
 /// A joint that the fit does not describe: the load of its teeth on the others is not known.
@@ -270,7 +256,7 @@ void require_explained(const Judged& judged) {
 /// The fitted teeth must be plausible ones: else a play found with them, or none, means nothing.
 void require_teeth(const CrossingFit& fit, std::size_t k, const Judged& judged) {
   const TraverseSettings& s = judged.settings;
-  const double stiffer = std::exp(fit.machine()[k][kCrossingStiffness]);
+  const double stiffer = fit.machine()[k][kCrossingStiffness];
   if (off_stiffness(fit, k) > s.far)
     throw Refusal{
         Status::out_of_domain,
@@ -300,11 +286,6 @@ void require_known(const CrossingFit& fit, std::size_t k, double half, double tu
                   fmt::format("cannot tell: the turns of the load show a play between {:.2g} and {:.2g} rad "
                               "only; a soft start of the teeth would look alike",
                               std::fmax(0, gap - half), gap + half)};
-  if (const double rival = rival_of(fit, k, s); std::isfinite(rival))
-    throw Refusal{
-        Status::ambiguous,
-        fmt::format("cannot tell: {:.3g} and {:.3g} rad explain the record alike: record for longer", gap,
-                    rival)};
 }
 
 void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const CrossingFit::Errors& errors,
@@ -332,14 +313,16 @@ void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const 
       judged.crossings, judged.misfit);
 }
 
+/// A fit ends where it is cheapest nearby: with the teeth that one has found the gap is tried once more.
 CrossingFit solved(const CrossingData& data) {
   CrossingFit fit(data);
-  fit.scan(grid());
-  fit.scan(grid());
+  fit.scan([](double) { return grid(); });
+  fit.scan(gaps_about);
   fit.run(kSteps);
-  fit.scan(grid());
-  fit.run(kSteps);
-  return fit;
+  CrossingFit other = fit;
+  other.scan(gaps_about);
+  other.run(kSteps);
+  return other.cost() < fit.cost() ? other : fit;
 }
 
 void report(const GearedArm& arm, const CrossingData& data, std::vector<JointTraverse>& out,

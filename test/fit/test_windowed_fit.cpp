@@ -65,6 +65,30 @@ class Lines : public Windows {
   Priors own_ = {{"level", 0, 100, false}};
 };
 
+/// exp(-rate t), of which the rate is a factor, and a value that is known.
+class Decay : public Windows {
+ public:
+  int count() const override { return 1; }
+  const Priors& shared() const override { return shared_; }
+  const Priors& own() const override { return own_; }
+  MatrixXd residuals(int, const MatrixXd& shared, const MatrixXd& own) const override {
+    MatrixXd r(30, shared.cols());
+    for (Eigen::Index c = 0; c < shared.cols(); ++c)
+      for (Eigen::Index i = 0; i < 30; ++i) {
+        const double t = 0.1 * double(i);
+        r(i, c) = (std::exp(-1.7 * t) -
+                   shared_[1].value(shared(1, c)) * std::exp(-shared_[0].value(shared(0, c)) * t) -
+                   own_[0].value(own(0, c))) /
+                  1e-3;
+      }
+    return r;
+  }
+
+ private:
+  Priors shared_ = {{"rate", 1, 2, true}, {"height", 1, 0, false}};
+  Priors own_ = {{"level", 0, 1, false}};
+};
+
 FitOptions all_but_without_robustness() {
   FitOptions options;
   options.robust = 1e9;
@@ -103,6 +127,43 @@ TEST(WindowedFit, AWindowThatIsNoneOfThemLosesItsWeight) {
   EXPECT_GT(robust.weight(1), 0.6);
 }
 
+// By hand, with Cauchy's loss of each window: where the fit has ended it is the fit's own cost.
+TEST(WindowedFit, TheCostElsewhereIsThatOfItsFormula) {
+  const Lines lines(3, 0.5, 1);
+  WindowedFit fit(lines);
+  const FitOptions options;
+  fit.run(options);
+  EXPECT_NEAR(fit.cost_at(fit.shared, options), fit.cost(), 1e-9 * fit.cost());
+  const VectorXd elsewhere = fit.shared.array() + 0.3;
+  double cost = elsewhere.squaredNorm();
+  for (int w = 0; w < lines.count(); ++w) {
+    const VectorXd& own = fit.own[std::size_t(w)];
+    const double scale = 4 * 20, squares = lines.residuals(w, elsewhere, own).squaredNorm();
+    cost += own.squaredNorm() + scale * std::log(1 + squares / scale);
+  }
+  EXPECT_NEAR(fit.cost_at(elsewhere, options), cost, 1e-9 * cost);
+}
+
+// Ten windows of the same points say the same; one of 20 times their noise says hardly anything.
+TEST(WindowedFit, WindowsThatSayLittleHardlyCount) {
+  const Lines alike(10, 0.5), one_odd(10, 0.5, 3);
+  WindowedFit all(alike), most(one_odd);
+  all.run(all_but_without_robustness()), most.run({});
+  EXPECT_NEAR(all.windows_that_count(0), 10, 1e-6);
+  EXPECT_GT(most.windows_that_count(0), 8.5);
+  EXPECT_LT(most.windows_that_count(0), 9.5);
+}
+
+TEST(WindowedFit, EndsWhereItWouldNotComeToWhatIsWanted) {
+  const Decay decay;
+  FitOptions in_vain;
+  in_vain.wanted = -1e9;
+  WindowedFit whole(decay), part(decay);
+  whole.shared[0] = part.shared[0] = 4;
+  whole.run({}), part.run(in_vain);
+  EXPECT_LT(whole.cost(), 0.5 * part.cost());
+}
+
 TEST(WindowedFit, IsTheSameEachTime) {
   const Lines lines(9, 0.5, 1);
   WindowedFit first(lines), second(lines);
@@ -111,30 +172,6 @@ TEST(WindowedFit, IsTheSameEachTime) {
   EXPECT_EQ(first.shared, second.shared);
   EXPECT_EQ(first.cost(), second.cost());
 }
-
-/// exp(-rate t), of which the rate is a factor, and a value that is known.
-class Decay : public Windows {
- public:
-  int count() const override { return 1; }
-  const Priors& shared() const override { return shared_; }
-  const Priors& own() const override { return own_; }
-  MatrixXd residuals(int, const MatrixXd& shared, const MatrixXd& own) const override {
-    MatrixXd r(30, shared.cols());
-    for (Eigen::Index c = 0; c < shared.cols(); ++c)
-      for (Eigen::Index i = 0; i < 30; ++i) {
-        const double t = 0.1 * double(i);
-        r(i, c) = (std::exp(-1.7 * t) -
-                   shared_[1].value(shared(1, c)) * std::exp(-shared_[0].value(shared(0, c)) * t) -
-                   own_[0].value(own(0, c))) /
-                  1e-3;
-      }
-    return r;
-  }
-
- private:
-  Priors shared_ = {{"rate", 1, 2, true}, {"height", 1, 0, false}};
-  Priors own_ = {{"level", 0, 1, false}};
-};
 
 /// Lines of which the first window cannot be followed.
 class Unfollowed : public Lines {

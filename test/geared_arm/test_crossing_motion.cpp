@@ -39,7 +39,11 @@ CrossingData some_data() {
 /// Of powers of 1: teeth are springs with a damper, and never pull.
 CrossingMachine some_machine() {
   CrossingMachine m(2);
-  for (auto& joint : m) joint.fill(0), joint[kCrossingPower] = 1;
+  for (auto& joint : m) {
+    joint.fill(0);
+    for (const int factor : {kCrossingStiffness, kCrossingDamping, kCrossingPower, kCrossingRotor})
+      joint[std::size_t(factor)] = 1;
+  }
   m[0][kCrossingGap] = 2e-3, m[1][kCrossingGap] = 3e-3;
   m[0][kCrossingCoulomb] = 0.3;
   return m;

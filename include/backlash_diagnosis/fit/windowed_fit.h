@@ -3,14 +3,16 @@
 // values that belong to one window (where it starts, a torque that nothing else explains). Every value has a
 // normal prior and is counted in its standard deviations z, so that the cost is
 //
-//   |z_shared|^2 + sum over windows w of (|z_w|^2 + rho(|r_w(z_shared, z_w)|^2))
+//   |z_shared|^2 + sum over windows w of (|z_w|^2 + sum over channels of rho(|r_w(z_shared, z_w)|^2))
 //
-// with whitened residuals r_w and Cauchy's loss rho over a window as a whole: one that the machine does not
-// follow loses weight. Solved by Levenberg and Marquardt's method with the Schur complement of Ceres Solver
-// (Agarwal, Mierle and others 2022); slopes by differences. The answer is the same on any number of threads.
+// with whitened residuals r_w and Cauchy's loss rho over a channel of a window as a whole: one that the
+// machine does not follow loses weight. Solved by Levenberg and Marquardt's method with the Schur complement
+// of Ceres Solver (Agarwal, Mierle and others 2022); slopes by differences. The answer is the same on any
+// number of threads.
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,8 @@ class Windows {
   virtual int count() const = 0;
   virtual const Priors& shared() const = 0;
   virtual const Priors& own() const = 0;
+  /// Rows of a window are so many equal parts, one after the other.
+  virtual int channels() const { return 1; }
   /// Whitened residuals of window `w`, a column for each column of `shared` (in spreads) and of `own`. Called
   /// from several threads, for one window each.
   virtual Eigen::MatrixXd residuals(int w, const Eigen::MatrixXd& shared,
@@ -43,12 +47,16 @@ class Windows {
 };
 
 struct FitOptions {
-  int iterations = 30;      ///< at most
-  double radius = 100;      ///< of the first trust region, in spreads
-  double robust = 4;        ///< > 0: a window with so many times its rows as squares has half of its weight
+  int iterations = 30;  ///< at most
+  double radius = 100;  ///< of the first trust region, in spreads
+  double robust =
+      4;  ///< > 0: a channel of a window with so many times its rows as squares has half of its weight
   double tolerance = 1e-5;  ///< relative gain of the cost, at which it ends
-  bool central = false;     ///< differences to both sides for the errors of the answer: those to one side add
-                            ///< information where values nearly mix
+  /// Cost, without which the fit is of no use: it ends where ten steps at the pace of one would not come
+  /// there.
+  double wanted = std::numeric_limits<double>::infinity();
+  bool central = false;  ///< differences to both sides for the errors of the answer: those to one side add
+                         ///< information where values nearly mix
 };
 
 class WindowedFit {
@@ -62,8 +70,10 @@ class WindowedFit {
 
   double value(int which) const { return windows_->shared()[std::size_t(which)].value(shared[which]); }
   double cost() const { return cost_; }  ///< infinite where no machine could be followed
-  /// Of a window's squares, 0 to 1, at what run() found.
-  double weight(int window) const;
+  /// With other shared values, those of the windows as they are.
+  double cost_at(const Eigen::VectorXd& others, const FitOptions& options) const;
+  /// Of the squares of a window's channel, 0 to 1, at what run() found.
+  double weight(int window, int channel = 0) const;
   /// Residuals of a window there.
   const Eigen::VectorXd& residual(int window) const { return parts_[std::size_t(window)].residual; }
   /// Mean square of a residual, windows by their weights: 1 where whitening is right.
@@ -74,6 +84,8 @@ class WindowedFit {
   /// Its inverse: what the windows say, their own values eliminated, and one of each prior.
   Eigen::MatrixXd information() const;
   Eigen::MatrixXd clustered_covariance() const;
+  /// How many windows determine a shared value, those that say more of it counting more.
+  double windows_that_count(Eigen::Index which) const;
 
  private:
   friend struct Evaluation;

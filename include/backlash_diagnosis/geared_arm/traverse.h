@@ -21,9 +21,9 @@
 //
 // The residual [N m], averaged over some samples, is weighted by its covariance: noise of the torque and of
 // the position, an unknown slow torque (as large as the fit to the whole record leaves), and
-// friction about a standstill. Where more is left the noise of that turn counts as that large. The rotor's
-// inertia multiplies noise of the position, for which the cost is corrected: else a lighter rotor would seem
-// better.
+// friction about a standstill. A turn of which much more is left at a joint loses weight there
+// (fit/windowed_fit.h). Plays are tried 2 % apart before the fit, and once more with the teeth that it has
+// found: a touch that comes a cycle of the teeth earlier or later explains a turn nearly as well.
 //
 // A joint whose link is too light for the sampling interval (fewer than eight samples in a cycle of its
 // teeth) gets no answer; it is fitted as all others for what it throws on their teeth, and below four samples
