@@ -65,10 +65,7 @@ report::Json step_json(const identification::FoundEffect& e, const identificatio
                        {"interval", report::json_interval(e.test_gain.lower, e.test_gain.upper)}};
   const identification::Evidence& v = e.evidence;
   json["evidence"] = {{"gain", report::json_number(v.gain)},
-                      {"gain_held_out", report::json_number(v.gain_held_out)},
-                      {"gain_forward", report::json_number(v.gain_forward)},
-                      {"blocks_better", v.blocks_better},
-                      {"blocks", v.blocks}};
+                      {"gain_held_out", report::json_number(v.gain_held_out)}};
   json["equivalent_to"] = e.equivalent_to;
   if (!e.nearest.empty()) json["nearest"] = e.nearest;
   json["choices"] = report::Json::object();

@@ -50,9 +50,6 @@ report::Json effect(const identification::FoundEffect& e, bool linear) {
                        {"after", percent(e.test_error_after)},
                        {"gain", percent(v.gain)},
                        {"gain_held_out", percent(v.gain_held_out)},
-                       {"gain_forward", percent(v.gain_forward)},
-                       {"blocks_better", v.blocks_better},
-                       {"blocks", v.blocks},
                        {"alike", alike}};
   for (const auto& [name, word] : e.words) json["words"].push_back({{"name", name}, {"word", word}});
   for (const identification::EffectParameter& p : e.parameters) {

@@ -39,10 +39,9 @@ std::string effect_text(const identification::FoundEffect& e, bool linear) {
                         model::axis_unit(p.unit, linear));
   const identification::Evidence& v = e.evidence;
   text += "    evidence: residual smaller by " + percent(v.gain) + " on the training records, " +
-          percent(v.gain_held_out) + " on blocks left out of the fit (" + std::to_string(v.blocks_better) +
-          " of " + std::to_string(v.blocks) + " better), " + percent(v.gain_forward) +
-          " on the last part;\n    on the unseen record smaller by " + percent(e.test_gain.value) +
-          " (95 %: " + percent(e.test_gain.lower) + " to " + percent(e.test_gain.upper) + ")\n";
+          percent(v.gain_held_out) + " on blocks left out of the fit;\n    on the unseen record smaller by " +
+          percent(e.test_gain.value) + " (95 %: " + percent(e.test_gain.lower) + " to " +
+          percent(e.test_gain.upper) + ")\n";
   if (!e.nearest.empty()) text += "    nearest named effects: " + joined(e.nearest) + "\n";
   if (!e.equivalent_to.empty()) text += "    would explain the same: " + joined(e.equivalent_to) + "\n";
   return text;

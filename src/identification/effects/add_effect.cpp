@@ -20,7 +20,7 @@ bool nothing_can_be_found(const Misfit& m, const SearchSettings& settings) {
 }
 
 HeldOut held_out_of(const Trial& trial, const Hypothesis& h, const SearchContext& context) {
-  return held_out(trial.fit, trial.start, h.fitted->records, context.settings.acceptance);
+  return held_out(trial.fit, h.fitted->records, context.settings.acceptance);
 }
 
 /// The other trials that gain nearly as much as `best`.
@@ -54,8 +54,7 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
       before, screen(before.fitted->fit, records, context.range, context.settings.screen), context);
   Hypothesis h = before;
   for (const RejectedEffect& r : trials.rejected) h = with_rejected(std::move(h), r.id, r.reason);
-  const HeldOut now =
-      held_out(before.fitted->fit, before.fitted->start, records, context.settings.acceptance);
+  const HeldOut now = held_out(before.fitted->fit, records, context.settings.acceptance);
   std::optional<Hypothesis> vague;  // explains as well with values that the records do not determine
   for (const Trial& best : trials.fitted) {
     const Gain gain = compare(now, held_out_of(best, before, context));

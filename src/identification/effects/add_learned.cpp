@@ -38,13 +38,13 @@ Hypothesis add_map(const Hypothesis& before, const SearchContext& context) {
   const RecordSet& records = before.fitted->records;
   const std::vector<LearnedCandidate> maps =
       learn_maps(before.fitted->fit, records, context.range, settings.maps);
-  const HeldOut now = held_out(before.fitted->fit, before.fitted->start, records, settings.acceptance);
+  const HeldOut now = held_out(before.fitted->fit, records, settings.acceptance);
   Hypothesis h = before;
   for (std::size_t i = 0; i < std::min(settings.maps.trials, maps.size()); ++i) {
     if (maps[i].gain < settings.trials.least_predicted * least) break;
     const auto trial = tried(h, {map_term().id, {maps[i].values}, maps[i].gain, maps[i].smoothness}, context);
     if (!trial) continue;
-    const Gain gain = compare(now, held_out(trial->fit, trial->start, records, settings.acceptance));
+    const Gain gain = compare(now, held_out(trial->fit, records, settings.acceptance));
     std::string reason = objection(gain, trial->fit.machine, records, settings);
     if (reason.empty() && gain.evidence.gain_held_out < least)
       reason = "lessens the residual in blocks left out of the fit by too little";

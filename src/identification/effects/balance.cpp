@@ -277,7 +277,7 @@ Balance::Squares Balance::squares_of(const std::vector<Eigen::Index>& rows, cons
   return s;
 }
 
-Balance::Explained Balance::explained(const Eigen::MatrixXd& columns, int blocks, double earlier) const {
+Balance::Explained Balance::explained(const Eigen::MatrixXd& columns, int blocks) const {
   const Eigen::MatrixXd normal = signal::gram(columns);
   const Eigen::VectorXd gradient = columns.transpose() * left_;
   const auto rows_where = [&](const auto& wanted) {
@@ -295,12 +295,8 @@ Balance::Explained Balance::explained(const Eigen::MatrixXd& columns, int blocks
         signal::solve_symmetric(normal - signal::gram(own), gradient - own.transpose() * of_left));
   };
   Squares held_out;
-  std::vector<Squares> of_blocks;
-  for (int b = 0; b < blocks; ++b) {
-    of_blocks.push_back(
-        without(rows_where([&](double t) { return std::min(blocks - 1, int(blocks * t)) == b; })));
-    held_out.add(of_blocks.back());
-  }
+  for (int b = 0; b < blocks; ++b)
+    held_out.add(without(rows_where([&](double t) { return std::min(blocks - 1, int(blocks * t)) == b; })));
   Explained out;
   out.deflection = held_out.decrease(1) > held_out.decrease(0);
   const auto channel = std::size_t(out.deflection);
@@ -308,8 +304,6 @@ Balance::Explained Balance::explained(const Eigen::MatrixXd& columns, int blocks
       squares_of(rows_where([](double) { return true; }), columns, signal::solve_symmetric(normal, gradient))
           .gain(channel);
   out.gain_held_out = held_out.gain(channel);
-  out.gain_forward = without(rows_where([&](double t) { return t > earlier; })).gain(channel);
-  for (const Squares& block : of_blocks) out.better += block.decrease(channel) > 0;
   out.of_signal =
       std::sqrt(std::max(0.0, held_out.decrease(channel)) / held_out.count[channel]) / signal_[channel];
   return out;

@@ -43,12 +43,10 @@ class Balance {
     bool deflection = false;
     double gain = 0;           // with factors fitted to all records
     double gain_held_out = 0;  // of blocks, each with factors fitted to the others
-    double gain_forward = 0;   // of the later part, with factors fitted to the earlier
-    int better = 0;            // blocks
     double of_signal = 0;      // held out, what is taken away over the standard deviation of the channel
   };
-  /// Each record in so many `blocks`, the later part from the share `earlier` of it on.
-  Explained explained(const Eigen::MatrixXd& columns, int blocks, double earlier) const;
+  /// Each record in so many `blocks`.
+  Explained explained(const Eigen::MatrixXd& columns, int blocks) const;
 
  private:
   struct Sample {

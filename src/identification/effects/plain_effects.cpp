@@ -52,9 +52,8 @@ std::vector<Plain> plain_candidates(const Hypothesis& h, const SearchContext& co
     const auto terms = probed_terms(c);
     Eigen::MatrixXd columns(balance.left().size(), Eigen::Index(terms.size()));
     for (std::size_t i = 0; i < terms.size(); ++i) columns.col(Eigen::Index(i)) = column(*terms[i]);
-    const Balance::Explained found = balance.explained(columns, acceptance.blocks, acceptance.earlier_part);
-    if (found.gain_held_out >= settings.asked.least_gain_unclear && found.of_signal >= acceptance.noise &&
-        found.better >= acceptance.most_blocks * acceptance.blocks)
+    const Balance::Explained found = balance.explained(columns, acceptance.blocks);
+    if (found.gain_held_out >= settings.asked.least_gain_unclear && found.of_signal >= acceptance.noise)
       all.push_back({c, found});
   }
   std::stable_sort(all.begin(), all.end(), [](const Plain& a, const Plain& b) {
@@ -79,7 +78,7 @@ Fitted fitted(const Plain& p, const SearchSettings& settings) {
   const Balance::Explained& e = p.explained;
   Fitted f{p.candidate, {}};
   f.gain.deflection = e.deflection;
-  f.gain.evidence = {e.gain, e.gain_held_out, e.gain_forward, e.better, settings.acceptance.blocks};
+  f.gain.evidence = {e.gain, e.gain_held_out};
   return f;
 }
 

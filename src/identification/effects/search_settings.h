@@ -34,9 +34,6 @@ struct TrialSettings {
 /// When an effect is believed (least gains: TraceSettings).
 struct AcceptanceSettings {
   int blocks = 12;                // choice: of each record, each left out once
-  double earlier_part = 0.6;      // choice: of each record, that the later part is predicted from
-  double earlier_gain = 0.5;      // choice: of the least gain, on the later part
-  double most_blocks = 0.6;       // choice: share of the blocks that must get better
   double least_in_noise = 0.006;  // choice: gain that always is enough in a residual that is mostly noise
   double sure = 5.5;      // theory: standard deviations that noise does not reach in a thousand trials
   double near_floor = 2;  // choice: times the floor: what is left is mostly noise

@@ -13,9 +13,6 @@ constexpr double kRidge = 1e-10;  // theory: of a squared sensitivity
 constexpr double kShown =
     0.05;  // choice: of a squared sensitivity; what the other rows hardly show stays where it is
 
-constexpr double kDampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1};  // choice: of a squared sensitivity
-constexpr double kNoWorse = 1.02;  // choice: of a sum of squares, what is lost to a linear step
-
 double duration(const PreparedServo& record) {
   return double(record.data().size()) * record.data().interval;
 }
@@ -29,9 +26,9 @@ std::vector<Eigen::Index> rows_where(const RecordSet& records, const Wanted& wan
   return rows;
 }
 
-/// Fitted values without these rows, by a linear step from the fit; damped as Marquardt does.
+/// Fitted values without these rows, by a linear step from the fit.
 Eigen::VectorXd without(const signal::LeastSquaresFit& fit, const Eigen::MatrixXd& normal,
-                        const std::vector<Eigen::Index>& rows, double damping = 0) {
+                        const std::vector<Eigen::Index>& rows) {
   const Eigen::MatrixXd j = fit.jacobian(rows, Eigen::all);
   const Eigen::VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd rest = unit.asDiagonal() * (normal - signal::gram(j)) * unit.asDiagonal();
@@ -43,7 +40,7 @@ Eigen::VectorXd without(const signal::LeastSquaresFit& fit, const Eigen::MatrixX
     rest(i, i) = 1;
     gradient[i] = 0;
   }
-  rest.diagonal().array() += kRidge + damping;
+  rest.diagonal().array() += kRidge;
   return unit.asDiagonal() * signal::solve_symmetric(rest, gradient);
 }
 
@@ -78,40 +75,7 @@ Squares all_but_worst(const std::vector<double>& before, const std::vector<doubl
 
 }  // namespace
 
-namespace {
-
-std::vector<Eigen::Index> late_rows(const RecordSet& records, const AcceptanceSettings& settings) {
-  return rows_where(records, [&](const RecordSet::Row& row) {
-    return row.time > settings.earlier_part * duration(records.records()[row.record]);
-  });
-}
-
-/// The later rows, with what the earlier ones say. The step that the later ones are left out by is linear:
-/// where it leads to a machine that leaves more of the earlier rows than before it is no fit of them, and a
-/// shorter one is taken.
-Eigen::VectorXd forward(const signal::LeastSquaresFit& f, const Machine& start, const RecordSet& records,
-                        const Eigen::MatrixXd& normal, const AcceptanceSettings& settings) {
-  const auto late = late_rows(records, settings);
-  const double all = f.residuals.squaredNorm(), earlier = all - f.residuals(late).squaredNorm();
-  Eigen::VectorXd r = f.residuals(late);
-  for (const double damping : kDampings) {
-    const Eigen::VectorXd change = without(f, normal, late, damping);
-    r = f.residuals(late) + f.jacobian(late, Eigen::all) * change;
-    try {
-      const Machine machine = Unknowns(start).machine(f.values + change);
-      const Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
-      r = rows(late);
-      if (rows.squaredNorm() - r.squaredNorm() <= kNoWorse * earlier) return r;
-    } catch (const Error&) {  // the step leads out of what a rig may be
-    }
-  }
-  return r;
-}
-
-}  // namespace
-
-HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records,
-                 const AcceptanceSettings& settings) {
+HeldOut held_out(const MachineFit& fit, const RecordSet& records, const AcceptanceSettings& settings) {
   const signal::LeastSquaresFit& f = fit.fit;
   const Eigen::MatrixXd normal = signal::gram(f.jacobian);
   HeldOut out;
@@ -127,8 +91,6 @@ HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& r
     out.torque.push_back(torque);
     out.deflection.push_back(deflection);
   }
-  const Eigen::VectorXd late = forward(f, start, records, normal, settings);
-  add_squares(records, late_rows(records, settings), late, out.torque_forward, out.deflection_forward);
   return out;
 }
 
@@ -141,18 +103,9 @@ Gain compare(const HeldOut& a, const HeldOut& b) {
                 torque_fit{a.torque_train, b.torque_train},
                 deflection_fit{a.deflection_train, b.deflection_train}, fit = torque_fit + deflection_fit;
   g.deflection = deflection_fit.decrease() > torque_fit.decrease();
-  const std::vector<double>&before = g.deflection ? a.deflection : a.torque,
-        &after = g.deflection ? b.deflection : b.torque;
   Evidence& e = g.evidence;
   e.gain = (g.deflection ? deflection_fit : torque_fit).gain();
   e.gain_held_out = std::min(e.gain, (g.deflection ? deflection : torque).gain());
-  e.gain_forward = g.deflection ? gain_of(a.deflection_forward, b.deflection_forward)
-                                : gain_of(a.torque_forward, b.torque_forward);
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    if (before[i] == 0) continue;
-    ++e.blocks;
-    e.blocks_better += after[i] < before[i];
-  }
   g.total = std::min(fit.gain(), (torque + deflection).gain());
   return g;
 }

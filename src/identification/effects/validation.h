@@ -9,16 +9,14 @@
 namespace backlash::identification {
 
 /// Norms of the residuals of one fit, each block of the records predicted by what the other blocks say
-/// (linear about the fit), and the later part predicted by the earlier (simulated).
+/// (linear about the fit).
 struct HeldOut {
   std::vector<double> torque, deflection;  // squares, per block
-  double torque_forward = 0, deflection_forward = 0;
   double torque_train = 0, deflection_train = 0;
 };
 
-/// `start` is what the fit's values belong to. Both fits to be compared must have the same weights.
-HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records,
-                 const AcceptanceSettings& settings);
+/// Both fits to be compared must have the same weights.
+HeldOut held_out(const MachineFit& fit, const RecordSet& records, const AcceptanceSettings& settings);
 
 /// What the second fit has gained on the first, of the channel that gains most.
 struct Gain {

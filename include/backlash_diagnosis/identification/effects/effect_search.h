@@ -46,8 +46,6 @@ struct EffectParameter {
 struct Evidence {
   double gain = 0;           // on the training records
   double gain_held_out = 0;  // on blocks left out of the fit
-  double gain_forward = 0;   // on the last two fifths, fitted to the rest
-  int blocks_better = 0, blocks = 0;
 };
 
 /// Relative decrease of the error of the channel on the unseen record, with its 95 % interval (blocks drawn
