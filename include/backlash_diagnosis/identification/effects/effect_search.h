@@ -4,8 +4,8 @@
 // The declared rig is fitted to the training records; then every term that says how it is sought
 // (model/term.h) is tried on what is left, and the best is fitted with all parameters of the machine
 // together. An effect is accepted where the prediction improves on blocks of the record that the fit has not
-// seen, and on the later part of the record. That is repeated until the residual is at the floor that noise
-// alone leaves, or nothing helps. Then a learned map may say what no named effect does.
+// seen. That is repeated until the residual is at the floor that noise alone leaves, or nothing helps. Then a
+// learned map may say what no named effect does.
 //
 // Three kinds of rig: two inertias with a mesh between them and two encoders (the load is simulated, driven
 // by the recorded motor; residuals of torque and deflection), one inertia (mesh: rigid) and a locked link
