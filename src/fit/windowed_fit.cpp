@@ -287,16 +287,18 @@ void WindowedFit::reduce(int window, MatrixXd* information, VectorXd* score) con
   const Part& part = parts_[std::size_t(window)];
   const Eigen::Index n = shared.size(), m = part.slopes.cols() - n,
                      rows = part.residual.size() / windows_->channels();
-  VectorXd f(part.residual.size());
-  for (int c = 0; c < windows_->channels(); ++c) f.segment(c * rows, rows).setConstant(weight(window, c));
-  const auto s = part.slopes.leftCols(n), o = part.slopes.rightCols(m);
-  const MatrixXd fs = f.asDiagonal() * s, fo = f.asDiagonal() * o;
-  const MatrixXd owns = o.transpose() * fo + MatrixXd::Identity(m, m), mixed = o.transpose() * fs;
+  MatrixXd owns = MatrixXd::Identity(m, m), mixed = MatrixXd::Zero(m, n), said = MatrixXd::Zero(n, n);
+  VectorXd of_shared = VectorXd::Zero(n), of_own = VectorXd::Zero(m);
+  for (int c = 0; c < windows_->channels(); ++c) {
+    const double f = weight(window, c);
+    const auto s = part.slopes.block(c * rows, 0, rows, n), o = part.slopes.block(c * rows, n, rows, m);
+    const auto r = part.residual.segment(c * rows, rows);
+    owns += f * (o.transpose() * o), mixed += f * (o.transpose() * s), said += f * (s.transpose() * s);
+    of_shared += f * (s.transpose() * r), of_own += f * (o.transpose() * r);
+  }
   const Eigen::LDLT<MatrixXd> solver(owns);
-  *information += s.transpose() * fs - mixed.transpose() * solver.solve(mixed);
-  *score =
-      fs.transpose() * part.residual -
-      mixed.transpose() * solver.solve(VectorXd(fo.transpose() * part.residual + own[std::size_t(window)]));
+  *information += said - mixed.transpose() * solver.solve(mixed);
+  *score = of_shared - mixed.transpose() * solver.solve(VectorXd(of_own + own[std::size_t(window)]));
 }
 
 MatrixXd WindowedFit::information() const {

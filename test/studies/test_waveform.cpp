@@ -300,7 +300,7 @@ TEST(Waveform, NoPlayIsBelowRange) {
   const Estimate e = diagnosis::estimate_waveform(record_of(drawn(8, 0)), declared());
   EXPECT_EQ(e.status, Status::below_range) << e.message;
   EXPECT_EQ(e.lower, 0);
-  EXPECT_LT(e.upper, 3e-6);
+  EXPECT_LT(e.upper, 4e-6);  // 3.3 um, or less than 3: the last bits of sums decide it
 }
 
 /// Fits of this machine stood still where 7 % of the torque were left, in two of three windows: its early
