@@ -287,7 +287,7 @@ void WindowedFit::reduce(int window, MatrixXd* information, VectorXd* score) con
   const Part& part = parts_[std::size_t(window)];
   const Eigen::Index n = shared.size(), m = part.slopes.cols() - n,
                      rows = part.residual.size() / windows_->channels();
-  MatrixXd owns = MatrixXd::Identity(m, m), mixed = MatrixXd::Zero(m, n), said = MatrixXd::Zero(n, n);
+  MatrixXd owns = MatrixXd::Zero(m, m), mixed = MatrixXd::Zero(m, n), said = MatrixXd::Zero(n, n);
   VectorXd of_shared = VectorXd::Zero(n), of_own = VectorXd::Zero(m);
   for (int c = 0; c < windows_->channels(); ++c) {
     const double f = weight(window, c);
@@ -296,6 +296,7 @@ void WindowedFit::reduce(int window, MatrixXd* information, VectorXd* score) con
     owns += f * (o.transpose() * o), mixed += f * (o.transpose() * s), said += f * (s.transpose() * s);
     of_shared += f * (s.transpose() * r), of_own += f * (o.transpose() * r);
   }
+  owns.diagonal().array() += 1;  // their priors
   const Eigen::LDLT<MatrixXd> solver(owns);
   *information += said - mixed.transpose() * solver.solve(mixed);
   *score = of_shared - mixed.transpose() * solver.solve(VectorXd(of_own + own[std::size_t(window)]));

@@ -16,7 +16,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 // What is known of the values, standard deviations: choices.
-constexpr double kWidestGap = 0.03;  // rad
 constexpr double kKnownStiffness = 0.5, kKnownDamping = 0.8, kKnownPower = 0.15, kKnownRotor = 0.1;
 constexpr double kKnownCoulomb = 0.5;                   // of the declared friction behind the gap, and
 constexpr double kUndeclaredCoulomb = 0.005;            // of the largest load
@@ -40,7 +39,7 @@ Index place(std::size_t joint, int value) {
 
 void add_shared(const TraverseJoint& joint, fit::Priors& all) {
   fit::Priors p(kCrossingValues);
-  p[kCrossingGap] = {"gap", 0, kWidestGap, false};
+  p[kCrossingGap] = {"gap", 0, kLargestGap, false};
   p[kCrossingStiffness] = {"stiffness of the teeth", 1, kKnownStiffness, true, kDifference};
   p[kCrossingDamping] = {"damping of the teeth", 1, kKnownDamping, true, kDifference};
   p[kCrossingPower] = {"power of the teeth", 1, kKnownPower, true, kDifference};
@@ -147,7 +146,7 @@ void CrossingWindows::vary_about(const CrossingMachine& machine) {
     const double spread =
         std::hypot(kVaries * machine[j][kCrossingGap], kTeethVary * joint.level / joint.stiffness);
     own_[machine.size() + j].spread = spread;
-    shared_[std::size_t(place(j, kCrossingGap))].step = kDifference * spread / kWidestGap;
+    shared_[std::size_t(place(j, kCrossingGap))].step = kDifference * spread / kLargestGap;
   }
 }
 
@@ -232,7 +231,7 @@ CrossingFit CrossingFit::held(std::size_t joint, double gap) const {
 }
 
 void CrossingFit::set_gap(std::size_t joint, double gap) {
-  fit_.shared[place(joint, kCrossingGap)] = gap / kWidestGap;
+  fit_.shared[place(joint, kCrossingGap)] = gap / kLargestGap;
 }
 
 void CrossingFit::run(int steps, double wanted) {
@@ -246,7 +245,7 @@ void CrossingFit::run(int steps, double wanted) {
 
 double CrossingFit::cost_with(std::size_t joint, double gap) const {
   VectorXd shared = fit_.shared;
-  shared[place(joint, kCrossingGap)] = gap / kWidestGap;
+  shared[place(joint, kCrossingGap)] = gap / kLargestGap;
   return fit_.cost_at(shared, fit::FitOptions());
 }
 
@@ -281,7 +280,7 @@ std::vector<CrossingFit::Errors> CrossingFit::errors() const {
   std::vector<Errors> errors(windows_->data().joints.size());
   for (std::size_t j = 0; j < errors.size(); ++j) {
     const Index p = place(j, kCrossingGap);
-    errors[j] = {kWidestGap * std::sqrt(of_fit(p, p)), kWidestGap * std::sqrt(clustered(p, p)),
+    errors[j] = {kLargestGap * std::sqrt(of_fit(p, p)), kLargestGap * std::sqrt(clustered(p, p)),
                  fit_.windows_that_count(p)};
   }
   return errors;

@@ -14,6 +14,8 @@
 
 namespace backlash::geared_arm {
 
+constexpr double kLargestGap = 0.03;  // rad, that is looked for; choice
+
 /// What an arm leaves of its motors' torques, whitened: of each joint the means over some samples.
 class CrossingWindows : public fit::Windows {
  public:
@@ -41,7 +43,7 @@ class CrossingWindows : public fit::Windows {
 
   const CrossingData& data_;
   fit::Priors shared_, own_;
-  std::shared_ptr<const Factors> factors_;  // of the covariances of what is left, lower: as large as all else
+  std::shared_ptr<const Factors> factors_;  // Cholesky's, of the covariances of what is left; never copied
 };
 
 class CrossingFit {

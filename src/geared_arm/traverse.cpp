@@ -22,22 +22,22 @@ using diagnosis::Refusal;
 using diagnosis::Status;
 using record::Channel;
 
-constexpr double kSmallest = 3e-5, kLargest = 0.03;  // rad, of the gaps that are tried first; choice
-constexpr int kTried = 40;                           // of them, evenly in the logarithm
-constexpr double kFine = 1.02;                       // ratio of those that are tried then; choice
-constexpr int kNearby = 10;                          // of them to each side: to the next of the first; theory
-constexpr int kSteps = 30;                           // of a fit
-constexpr double kProfile = 1.5;                     // ratio of gaps that a profile looks at; choice
-constexpr int kProfileSteps = 6;                     // of its fits; choice
-constexpr double kLeastSlow = 0.005;                 // of the largest load; choice
-constexpr double kCycleSamples = 8;                  // in a cycle of the teeth, at least; choice
-constexpr double kFelt = 4;                          // the same, of joints that move others; choice
-constexpr double kTypical = 0.5;                     // of the largest load: where teeth are known; choice
+constexpr double kSmallest = 3e-5;    // rad, of the gaps that are tried first; choice
+constexpr int kTried = 40;            // of them, evenly in the logarithm
+constexpr double kFine = 1.02;        // ratio of those that are tried then; choice
+constexpr int kNearby = 10;           // of them to each side: to the next of the first; theory
+constexpr int kSteps = 30;            // of a fit
+constexpr double kProfile = 1.5;      // ratio of gaps that a profile looks at; choice
+constexpr int kProfileSteps = 6;      // of its fits; choice
+constexpr double kLeastSlow = 0.005;  // of the largest load; choice
+constexpr double kCycleSamples = 8;   // in a cycle of the teeth, at least; choice
+constexpr double kFelt = 4;           // the same, of joints that move others; choice
+constexpr double kTypical = 0.5;      // of the largest load: where teeth are known; choice
 
 std::vector<double> grid() {
   std::vector<double> gaps{0};
   for (int i = 0; i < kTried; ++i)
-    gaps.push_back(kSmallest * std::pow(kLargest / kSmallest, double(i) / (kTried - 1)));
+    gaps.push_back(kSmallest * std::pow(kLargestGap / kSmallest, double(i) / (kTried - 1)));
   return gaps;
 }
 
@@ -200,7 +200,7 @@ double evidence_of(const CrossingFit& best, std::size_t k, double wanted) {
 /// The largest gap that explains the record about as well as the best, `from` or more.
 double largest_of(const CrossingFit& best, std::size_t k, double from, const TraverseSettings& settings) {
   CrossingFit other = best;
-  for (double gap = from; gap < kLargest; gap *= kProfile) {
+  for (double gap = from; gap < kLargestGap; gap *= kProfile) {
     other = other.held(k, gap);
     other.run(kProfileSteps);
     if (other.cost() - best.cost() > settings.rival) return gap;
@@ -208,7 +208,7 @@ double largest_of(const CrossingFit& best, std::size_t k, double from, const Tra
   throw Refusal{Status::insufficient_data,
                 fmt::format("cannot tell: the turns of the load rule out no play up to {:.2g} rad: turn the "
                             "load faster, or record for longer",
-                            kLargest)};
+                            kLargestGap)};
 }
 
 double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Errors& errors,

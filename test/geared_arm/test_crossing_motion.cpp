@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../../src/geared_arm/crossing_motion.h"
+#include "../../src/geared_arm/crossing_fit.h"
 
 namespace backlash::geared_arm {
 namespace {
@@ -102,6 +102,28 @@ TEST(CrossingMotion, IsThatOfTheEquations) {
   }
   EXPECT_LT(error_of(1, expected), 0.003);
   EXPECT_LT(error_of(2, expected), 0.0005);
+}
+
+// A gap that all turns share and one of a turn alone are one number to its teeth. Sums that differ in their
+// last bits let a touch more or less decide that one turn knows the common gap better than its own leaves.
+TEST(CrossingWindows, AStepOfTheGapIsOneOfTheTurn) {
+  CrossingData data = some_data();
+  CrossingWindow& window = data.windows[0];
+  window.torque = window.friction = window.unsure = Eigen::MatrixXd::Zero(window.samples(), 2);
+  for (TraverseJoint& joint : data.joints)
+    joint.most = 30, joint.least_inertia = 0.2, joint.torque_noise = 0.1, joint.position_noise = 1e-6;
+  CrossingWindows windows(data);
+  windows.vary_about(some_machine());
+  Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(2 * kCrossingValues, 3),
+                  own = Eigen::MatrixXd::Zero(2 * kCrossingOwn, 3);
+  const fit::Prior &gap = windows.shared()[kCrossingGap], &wider = windows.own()[2];
+  shared.row(kCrossingGap).setConstant(2e-3 / gap.spread);
+  shared(kCrossingGap, 1) += gap.step;
+  own(2, 2) += wider.step;
+  const Eigen::MatrixXd left = windows.residuals(0, shared, own);
+  ASSERT_TRUE(left.allFinite());
+  EXPECT_GT((left.col(1) - left.col(0)).norm(), 0);
+  EXPECT_EQ(left.col(1), left.col(2));
 }
 
 }  // namespace

@@ -47,10 +47,9 @@ class Windows {
 };
 
 struct FitOptions {
-  int iterations = 30;  ///< at most
-  double radius = 100;  ///< of the first trust region, in spreads
-  double robust =
-      4;  ///< > 0: a channel of a window with so many times its rows as squares has half of its weight
+  int iterations = 30;      ///< at most
+  double radius = 100;      ///< of the first trust region, in spreads
+  double robust = 4;        ///< > 0: squares per row, with which a channel of a window has half of its weight
   double tolerance = 1e-5;  ///< relative gain of the cost, at which it ends
   /// Cost, without which the fit is of no use: it ends where ten steps at the pace of one would not come
   /// there.
